@@ -1,0 +1,26 @@
+# Language level and warnings, the same for every package of this workspace.
+set(CMAKE_CXX_STANDARD 20)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_POSITION_INDEPENDENT_CODE ON)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+if(NOT CMAKE_BUILD_TYPE)
+  set(CMAKE_BUILD_TYPE RelWithDebInfo)
+endif()
+
+option(CAMVOX_WERROR "Treat warnings as errors" OFF)
+option(CAMVOX_SANITIZE "Build with -fsanitize=address,undefined" OFF)
+
+add_compile_options(-Wall -Wextra -Wshadow -Wconversion -Wnon-virtual-dtor)
+if(CAMVOX_WERROR)
+  add_compile_options(-Werror)
+endif()
+if(CAMVOX_SANITIZE)
+  add_compile_options(-fsanitize=address,undefined -fno-omit-frame-pointer)
+  add_link_options(-fsanitize=address,undefined)
+endif()
+
+find_program(CAMVOX_CCACHE ccache)
+if(CAMVOX_CCACHE)
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${CAMVOX_CCACHE})
+endif()
