@@ -1,0 +1,187 @@
+#pragma once
+
+#include "camvox/config/parameters.hpp"
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "camvox/component/diagnostics.hpp"
+#include "camvox/component/logger.hpp"
+#include "camvox/component/publisher.hpp"
+#include "camvox/component/sample.hpp"
+#include "camvox/interfaces/message_type.hpp"
+#include "camvox/interfaces/qos.hpp"
+#include "camvox/interfaces/topics.hpp"
+
+namespace camvox {
+
+using interfaces::MessageType;
+using interfaces::Qos;
+namespace qos = interfaces::qos;
+namespace topics = interfaces::topics;
+
+/// One input or output of a component: its name in the config's `remap`, and the topic it is
+/// connected to unless remapped.
+struct Port {
+  std::string_view name;
+  std::string_view default_topic;
+};
+
+struct PublishOptions {
+  Qos qos = qos::kDefault;
+  int max_loans = 2;          ///< Loans that the component may hold at one time.
+  std::string type_name = {};  ///< Another ROS name for the same message, e.g. of an old driver.
+};
+
+struct SubscribeOptions {
+  Qos qos = qos::kDefault;
+  int max_held = 2;      ///< Samples that the component may keep after its callback returned.
+  bool required = true;  ///< An internal topic that nothing publishes is then an error.
+  std::string type_name = {};
+};
+
+/// Counters of one subscription.
+struct SubscriptionStats {
+  std::uint64_t received = 0;
+  std::uint64_t lost = 0;      ///< Sent but never seen here: overwritten while waiting, or dropped.
+  std::uint64_t rejected = 0;  ///< Malformed, or over capacity.
+  std::uint64_t starved = 0;   ///< Times that delivery waited because too many samples were held.
+};
+
+/// What a middleware keeps for a subscription; ends delivery when destroyed.
+class SubscriptionBackend {
+ public:
+  SubscriptionBackend() = default;
+  SubscriptionBackend(const SubscriptionBackend&) = delete;
+  SubscriptionBackend& operator=(const SubscriptionBackend&) = delete;
+  virtual ~SubscriptionBackend() = default;
+  [[nodiscard]] virtual SubscriptionStats stats() const = 0;
+  [[nodiscard]] virtual std::size_t publisher_count() const = 0;
+};
+
+/// Handle of a subscription. It lives as long as the component, handle or not.
+using Subscription = std::shared_ptr<const SubscriptionBackend>;
+
+/// A message as bytes, for components that work on any type (record, replay).
+struct RawMessage {
+  std::vector<std::uint8_t> cdr;  ///< With the four-byte encapsulation.
+};
+
+/// Everything that a component sees of the world outside. The container implements it over DDS,
+/// unit tests with camvox::FakeContext.
+class Context {
+ public:
+  using Callback = std::function<void(std::shared_ptr<const void>, const MessageInfo&)>;
+
+  Context() = default;
+  Context(const Context&) = delete;
+  Context& operator=(const Context&) = delete;
+  virtual ~Context() = default;
+
+  /// The component's name in the config.
+  [[nodiscard]] virtual const std::string& name() const = 0;
+  [[nodiscard]] virtual Logger& log() = 0;
+  [[nodiscard]] virtual Diagnostics& diagnostics() = 0;
+  /// Wall clock, or the time of /clock when `use_sim_time` is set; ns since the epoch.
+  [[nodiscard]] virtual std::int64_t now_ns() const = 0;
+
+  /// The component's config, checked. Throws config::ConfigError with all problems.
+  template <typename Config>
+  [[nodiscard]] Config parameters() {
+    Config config;
+    auto problems = config::load(given_parameters(), config);
+    accept_parameters(config::dump(config), std::move(problems));
+    return config;
+  }
+
+  /// Lets parameters be set while running: `callback` gets each new, checked config on the
+  /// component's thread. Without this call every parameter is fixed after start.
+  template <typename Config>
+  void on_parameter_change(Config current, std::function<void(const Config&)> callback) {
+    accept_changes([current, callback](const config::ParameterMap& changes) mutable {
+      Config next = current;
+      auto problems = config::load(changes, next);
+      if (problems.empty()) {
+        current = next;
+        callback(current);
+      }
+      return problems;
+    });
+  }
+
+  template <typename T>
+  [[nodiscard]] Publisher<T> advertise(const Port& port, const PublishOptions& options = {}) {
+    return Publisher<T>(make_publisher(port, interfaces::message_type<T>(), options));
+  }
+
+  /// Calls back with every message, on the component's thread.
+  template <typename T>
+  Subscription subscribe(const Port& port,
+                         std::function<void(const Sample<T>&)> callback,
+                         const SubscribeOptions& options = {}) {
+    return make_subscription(
+        port,
+        interfaces::message_type<T>(),
+        [callback](std::shared_ptr<const void> message, const MessageInfo& info) {
+          callback(Sample<T>(std::static_pointer_cast<const T>(std::move(message)), info));
+        },
+        options);
+  }
+
+  /// Publisher and subscription of serialised messages of any type ("pkg/msg/Name").
+  [[nodiscard]] Publisher<RawMessage> advertise_raw(const Port& port,
+                                                    std::string_view type_name,
+                                                    const PublishOptions& options = {}) {
+    return Publisher<RawMessage>(make_raw_publisher(port, type_name, options));
+  }
+  Subscription subscribe_raw(const Port& port,
+                             std::string_view type_name,
+                             std::function<void(const Sample<RawMessage>&)> callback,
+                             const SubscribeOptions& options = {}) {
+    return make_raw_subscription(
+        port,
+        type_name,
+        [callback](std::shared_ptr<const void> message, const MessageInfo& info) {
+          callback(Sample<RawMessage>(
+              std::static_pointer_cast<const RawMessage>(std::move(message)), info));
+        },
+        options);
+  }
+
+  /// Calls back periodically on the component's thread, until the component ends. A call that is
+  /// late by more than a period is skipped, not made up for.
+  virtual void every(std::chrono::nanoseconds period, std::function<void()> callback) = 0;
+
+  /// Runs something once on the component's thread; safe to call from any thread.
+  virtual void post(std::function<void()> callback) = 0;
+
+ protected:
+  using ChangeHandler =
+      std::function<std::vector<config::Problem>(const config::ParameterMap& changes)>;
+
+  [[nodiscard]] virtual const config::ParameterMap& given_parameters() const = 0;
+  /// Gets the effective parameters and what is wrong with the given ones.
+  virtual void accept_parameters(config::ParameterMap effective,
+                                 std::vector<config::Problem> problems) = 0;
+  virtual void accept_changes(ChangeHandler handler) = 0;
+  virtual std::shared_ptr<PublisherBackend> make_publisher(const Port& port,
+                                                           const MessageType& type,
+                                                           const PublishOptions& options) = 0;
+  virtual Subscription make_subscription(const Port& port,
+                                         const MessageType& type,
+                                         Callback callback,
+                                         const SubscribeOptions& options) = 0;
+  virtual std::shared_ptr<PublisherBackend> make_raw_publisher(const Port& port,
+                                                               std::string_view type_name,
+                                                               const PublishOptions& options) = 0;
+  virtual Subscription make_raw_subscription(const Port& port,
+                                             std::string_view type_name,
+                                             Callback callback,
+                                             const SubscribeOptions& options) = 0;
+};
+
+}  // namespace camvox

@@ -1,0 +1,120 @@
+#pragma once
+
+#include <chrono>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "camvox/component/context.hpp"
+#include "camvox/dds/executor.hpp"
+#include "camvox/dds/participant.hpp"
+
+namespace camvox::dds {
+
+/// How one topic crosses this container's border; from the config's `topics` section.
+struct TopicSettings {
+  bool interprocess_zero_copy = false;  ///< Share memory with other processes of this machine.
+  std::chrono::milliseconds max_blocking{50};  ///< Longest time a publish may wait for readers.
+};
+using TopicSettingsMap = std::map<std::string, TopicSettings, std::less<>>;
+
+class Gateway;
+
+/// What all components of one container share.
+struct Middleware {
+  std::shared_ptr<Participant> participant;
+  std::shared_ptr<Gateway> gateway;  ///< Carries internal topics to and from other processes.
+  TopicSettingsMap topics;
+};
+
+/// Creates what the components of a container share.
+[[nodiscard]] Middleware make_middleware(const ParticipantOptions& options,
+                                         TopicSettingsMap topics,
+                                         Logger& log);
+
+/// A component's place in a container, from its config entry.
+struct ComponentSettings {
+  std::string name;
+  config::ParameterMap parameters;
+  std::map<std::string, std::string, std::less<>> remap;  ///< Port name -> topic name.
+};
+
+/// Counters of one subscription of a component, for diagnostics and `topic info`.
+struct PortStats {
+  std::string topic;
+  SubscriptionStats stats;
+};
+
+/// Context over Fast DDS. Endpoints are made while the component is constructed, but nothing is
+/// delivered before `activate`.
+class ComponentContext final : public Context {
+ public:
+  /// `on_error` gets each exception that leaves a callback, on the executor's thread.
+  ComponentContext(ComponentSettings settings,
+                   Middleware middleware,
+                   std::shared_ptr<Executor> executor,
+                   std::shared_ptr<Logger> log,
+                   std::function<void(std::exception_ptr)> on_error);
+  ~ComponentContext() override;
+
+  /// Starts delivery: subscriptions, timers, posted work.
+  void activate();
+  /// Ends delivery. False: a callback did not return in time; the component must then be kept.
+  bool deactivate(std::chrono::milliseconds timeout);
+
+  [[nodiscard]] const std::shared_ptr<Tenant>& tenant() const { return tenant_; }
+  [[nodiscard]] const config::ParameterMap& effective_parameters() const { return effective_; }
+  [[nodiscard]] bool parameters_can_change() const { return change_handler_ != nullptr; }
+  /// Checks and applies changed parameters on the component's thread. Returns what is wrong; then
+  /// nothing was changed.
+  [[nodiscard]] std::vector<config::Problem> change_parameters(const config::ParameterMap& changes);
+  [[nodiscard]] std::vector<PortStats> subscription_stats() const;
+
+  [[nodiscard]] const std::string& name() const override { return settings_.name; }
+  [[nodiscard]] Logger& log() override { return *log_; }
+  [[nodiscard]] Diagnostics& diagnostics() override { return diagnostics_; }
+  [[nodiscard]] std::int64_t now_ns() const override;
+  void every(std::chrono::nanoseconds period, std::function<void()> callback) override;
+  void post(std::function<void()> callback) override;
+
+ protected:
+  [[nodiscard]] const config::ParameterMap& given_parameters() const override {
+    return settings_.parameters;
+  }
+  void accept_parameters(config::ParameterMap effective,
+                         std::vector<config::Problem> problems) override;
+  void accept_changes(ChangeHandler handler) override { change_handler_ = std::move(handler); }
+  std::shared_ptr<PublisherBackend> make_publisher(const Port& port,
+                                                   const MessageType& type,
+                                                   const PublishOptions& options) override;
+  Subscription make_subscription(const Port& port,
+                                 const MessageType& type,
+                                 Callback callback,
+                                 const SubscribeOptions& options) override;
+  std::shared_ptr<PublisherBackend> make_raw_publisher(const Port& port,
+                                                       std::string_view type_name,
+                                                       const PublishOptions& options) override;
+  Subscription make_raw_subscription(const Port& port,
+                                     std::string_view type_name,
+                                     Callback callback,
+                                     const SubscribeOptions& options) override;
+
+ private:
+  [[nodiscard]] std::string topic_of(const Port& port) const;
+  void when_active(std::function<void()> action);
+
+  ComponentSettings settings_;
+  Middleware middleware_;
+  std::shared_ptr<Executor> executor_;
+  std::shared_ptr<Logger> log_;
+  std::shared_ptr<Tenant> tenant_;
+  Diagnostics diagnostics_;
+  config::ParameterMap effective_;
+  ChangeHandler change_handler_;
+  bool active_ = false;
+  std::vector<std::function<void()>> pending_;
+  std::vector<std::pair<std::string, Subscription>> subscriptions_;
+};
+
+}  // namespace camvox::dds

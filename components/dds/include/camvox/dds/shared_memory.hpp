@@ -1,0 +1,17 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace camvox::dds {
+
+/// Bytes that are free in /dev/shm; 0 if it is not there.
+[[nodiscard]] std::uint64_t free_shared_memory_bytes(const std::string& directory = "/dev/shm");
+
+/// Removes what Fast DDS processes left in shared memory when they were killed: files of ours that
+/// no living process has mapped or open. Returns their names. Files younger than two seconds, and
+/// those of other users, are left alone.
+std::vector<std::string> remove_stale_shared_memory(const std::string& directory = "/dev/shm");
+
+}  // namespace camvox::dds
