@@ -74,7 +74,7 @@ def users_header(package):
 def types_source(package, packages):
     kind = "plain" if package.plain else "ros"
     lines = [f'#include "camvox/interfaces/{package.name}.hpp"', "",
-             '#include "topic_types.hpp"', "", "namespace camvox::interfaces {"]
+             '#include "make_message_type.hpp"', "", "namespace camvox::interfaces {"]
     for message in package.messages:
         cpp = f"{package.name}::{message.namespace}::{message.name}"
         text = schema_text(message, packages)

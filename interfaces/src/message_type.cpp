@@ -2,6 +2,13 @@
 
 namespace camvox::interfaces {
 
+std::vector<std::uint8_t> MessageType::to_cdr(const void* message) const {
+  if (!counters_valid(message)) return {};
+  std::vector<std::uint8_t> data(cdr_size(message));
+  data.resize(write_cdr(message, data.data(), data.size()));
+  return data;
+}
+
 const MessageType* find_message_type(std::string_view name) {
   for (const MessageType* type : all_message_types()) {
     if (type->ros_name == name || type->dds_name == name) return type;

@@ -24,7 +24,8 @@ struct Flat<std::array<T, N>> {
 };
 
 template <typename T>
-inline constexpr bool kIsPrimitive = std::is_arithmetic_v<typename Flat<std::remove_const_t<T>>::Element>;
+inline constexpr bool kIsPrimitive =
+    std::is_arithmetic_v<typename Flat<std::remove_const_t<T>>::Element>;
 
 /// Base of the visitors: primitives go to `Derived::primitives`, nested structs are descended.
 template <typename Derived>
@@ -119,6 +120,18 @@ class CdrReader : public LayoutVisitor<CdrReader> {
   std::size_t size_;
   std::size_t position_ = 0;
   bool ok_ = true;
+};
+
+/// Zeroes what is always used, and the counters.
+struct Clear : LayoutVisitor<Clear> {
+  template <typename Element>
+  void primitives(void* target, std::size_t count) {
+    std::memset(target, 0, count * sizeof(Element));
+  }
+  template <typename Array>
+  void list(Array&, std::uint32_t& count) {
+    count = 0;
+  }
 };
 
 /// Checks every counter against the capacity of its list.

@@ -7,10 +7,6 @@
 #include <string_view>
 #include <vector>
 
-namespace eprosima::fastdds::dds {
-class TopicDataType;
-}
-
 namespace camvox::interfaces {
 
 /// Everything that the middleware, the recorder and the command line need to know of one message.
@@ -20,28 +16,31 @@ namespace camvox::interfaces {
 /// Outside the container both are CDR that ROS 2 can read: a plain message crosses as the ROS 2
 /// message described by `schema`, with only the used part of its lists.
 struct MessageType {
-  using MakeTopicType = eprosima::fastdds::dds::TopicDataType* (*)();
-
-  std::string ros_name;   ///< "sensor_msgs/msg/Imu"
-  std::string dds_name;   ///< "sensor_msgs::msg::dds_::Imu_"
-  std::string type_hash;  ///< RIHS01_... (REP-2016)
+  std::string ros_name;     ///< "sensor_msgs/msg/Imu"
+  std::string dds_name;     ///< "sensor_msgs::msg::dds_::Imu_"
+  std::string type_hash;    ///< RIHS01_... (REP-2016)
   std::string_view schema;  ///< Definition with dependencies, MCAP encoding "ros2msg".
   bool plain = false;
   std::size_t size = 0;  ///< sizeof the C++ struct.
 
-  MakeTopicType make_wire_type = nullptr;   ///< CDR of `schema`; caller owns.
-  MakeTopicType make_plain_type = nullptr;  ///< In-place layout, only if plain; caller owns.
-
-  void* (*create)() = nullptr;          ///< A default-constructed message on the heap.
-  void (*destroy)(void*) = nullptr;     ///< Frees what `create` gave.
+  void* (*create)() = nullptr;       ///< A default-constructed message on the heap.
+  void (*destroy)(void*) = nullptr;  ///< Frees what `create` gave.
+  /// Back to a default message; the rows of a plain message's lists stay as they are.
+  void (*reset)(void* message) = nullptr;
   /// Copies a message; of a plain one only the used part, so that capacity costs nothing.
   void (*copy)(const void* from, void* to) = nullptr;
   /// False if a counter of a plain message exceeds its list's capacity. Others: always true.
   bool (*counters_valid)(const void* message) = nullptr;
-  /// CDR with its four-byte encapsulation, as on the wire and in a recording.
-  std::vector<std::uint8_t> (*to_cdr)(const void* message) = nullptr;
+
+  /// Bytes of the CDR form with its four-byte encapsulation, as on the wire and in a recording.
+  std::size_t (*cdr_size)(const void* message) = nullptr;
+  /// Writes the CDR form; returns its size, or 0 if the message is invalid or does not fit.
+  std::size_t (*write_cdr)(const void* message, std::uint8_t* data, std::size_t size) = nullptr;
   /// Reads CDR into an existing message; false if it is malformed or over capacity.
-  bool (*from_cdr)(const std::uint8_t* data, std::size_t size, void* message) = nullptr;
+  bool (*read_cdr)(const std::uint8_t* data, std::size_t size, void* message) = nullptr;
+
+  /// The CDR form as a vector; empty if the message is invalid.
+  [[nodiscard]] std::vector<std::uint8_t> to_cdr(const void* message) const;
 };
 
 /// The description of message type T, e.g. `message_type<sensor_msgs::msg::Imu>()`.

@@ -6,9 +6,9 @@ namespace camvox::interfaces {
 
 /// Quality of service of one endpoint, in ROS 2's words. History is always KEEP_LAST.
 struct Qos {
-  int depth = 10;            ///< Samples that wait for a slow reader; the oldest goes first.
-  bool reliable = true;      ///< Repeat what the network lost (writer); demand it (reader).
-  bool latched = false;      ///< TRANSIENT_LOCAL: a late reader gets the last `depth` samples.
+  int depth = 10;        ///< Samples that wait for a slow reader; the oldest goes first.
+  bool reliable = true;  ///< Repeat what the network lost (writer); demand it (reader).
+  bool latched = false;  ///< TRANSIENT_LOCAL: a late reader gets the last `depth` samples.
 
   friend bool operator==(const Qos&, const Qos&) = default;
 };

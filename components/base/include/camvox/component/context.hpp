@@ -1,6 +1,5 @@
 #pragma once
 
-#include "camvox/config/parameters.hpp"
 #include <chrono>
 #include <cstdint>
 #include <functional>
@@ -13,6 +12,7 @@
 #include "camvox/component/logger.hpp"
 #include "camvox/component/publisher.hpp"
 #include "camvox/component/sample.hpp"
+#include "camvox/config/parameters.hpp"
 #include "camvox/interfaces/message_type.hpp"
 #include "camvox/interfaces/qos.hpp"
 #include "camvox/interfaces/topics.hpp"
@@ -33,7 +33,7 @@ struct Port {
 
 struct PublishOptions {
   Qos qos = qos::kDefault;
-  int max_loans = 2;          ///< Loans that the component may hold at one time.
+  int max_loans = 2;           ///< Loans that the component may hold at one time.
   std::string type_name = {};  ///< Another ROS name for the same message, e.g. of an old driver.
 };
 

@@ -41,16 +41,16 @@ std::unique_ptr<ServiceServer> serve(const std::shared_ptr<Participant>& partici
                                      const std::shared_ptr<Tenant>& tenant,
                                      const std::string& name,
                                      std::function<void(const Request&, Response&)> handler) {
-  return std::make_unique<ServiceServer>(
-      participant,
-      executor,
-      tenant,
-      name,
-      interfaces::message_type<Request>(),
-      interfaces::message_type<Response>(),
-      [handler](const void* request, void* response) {
-        handler(*static_cast<const Request*>(request), *static_cast<Response*>(response));
-      });
+  return std::make_unique<ServiceServer>(participant,
+                                         executor,
+                                         tenant,
+                                         name,
+                                         interfaces::message_type<Request>(),
+                                         interfaces::message_type<Response>(),
+                                         [handler](const void* request, void* response) {
+                                           handler(*static_cast<const Request*>(request),
+                                                   *static_cast<Response*>(response));
+                                         });
 }
 
 /// Calls a service and waits for the answer. Returns false if no server answered in time (also
