@@ -1,0 +1,8 @@
+# find_package(camvox_components): imported targets camvox::component and camvox::dds.
+include(CMakeFindDependencyMacro)
+find_dependency(camvox)
+find_dependency(camvox_interfaces)
+find_dependency(fastrtps)
+find_dependency(fmt)
+include("${CMAKE_CURRENT_LIST_DIR}/class_loader.cmake")
+include("${CMAKE_CURRENT_LIST_DIR}/camvox_components_targets.cmake")
