@@ -19,12 +19,10 @@ std::unique_ptr<WriterHandle> make_shared_writer(const std::shared_ptr<Participa
     throw std::runtime_error("topic " + topic +
                              ": a latched topic cannot be zero_copy: interprocess");
   }
-  // The hash in the type's name keeps builds with other layouts or capacities apart.
-  return std::make_unique<WriterHandle>(
-      participant,
-      shared_topic_name(topic),
-      new PlainTopicType(type.dds_name + type.type_hash, type.size),
-      shared_writer_qos(options.qos, settings.max_blocking));
+  return std::make_unique<WriterHandle>(participant,
+                                        shared_topic_name(topic),
+                                        make_plain_topic_type(type),
+                                        shared_writer_qos(options.qos, settings.max_blocking));
 }
 
 }  // namespace
@@ -41,7 +39,7 @@ PlainPublisher::PlainPublisher(std::shared_ptr<Participant> participant,
       in_place_(
           std::make_unique<WriterHandle>(participant,
                                          in_place_topic_name(*participant, topic),
-                                         new PlainTopicType(type.dds_name, type.size),
+                                         make_plain_topic_type(type),
                                          in_place_writer_qos(options.qos, options.max_loans))),
       shared_(make_shared_writer(participant, topic, type, options, settings)) {}
 
