@@ -148,6 +148,12 @@ MessageInfo SequenceTracker::track(const fdds::SampleInfo& info) {
   return message;
 }
 
+eprosima::fastrtps::rtps::WriteParams write_parameters(std::int64_t publish_stamp_ns) {
+  eprosima::fastrtps::rtps::WriteParams parameters;
+  if (publish_stamp_ns > 0) parameters.source_timestamp().from_ns(publish_stamp_ns);
+  return parameters;
+}
+
 std::string in_place_topic_name(const Participant& participant, const std::string& topic) {
   return "in/" + participant.unique_token() + topic;
 }

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <fastdds/rtps/common/WriteParams.h>
+
 #include <atomic>
 #include <chrono>
 #include <fastdds/dds/publisher/DataWriter.hpp>
@@ -113,6 +115,9 @@ struct AtomicStats {
   }
   [[nodiscard]] SubscriptionStats snapshot() const { return {received, lost, rejected, starved}; }
 };
+
+/// Parameters of a write on behalf of somebody who sent the message at that time (ns; 0: now).
+[[nodiscard]] eprosima::fastrtps::rtps::WriteParams write_parameters(std::int64_t publish_stamp_ns);
 
 /// DDS name of a topic's in-place samples: unique to this process, so that no other matches it.
 [[nodiscard]] std::string in_place_topic_name(const Participant& participant,

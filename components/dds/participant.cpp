@@ -98,6 +98,7 @@ class LogConsumer final : public fdds::LogConsumer {
  public:
   explicit LogConsumer(Logger& log) : log_(log) {}
   void Consume(const fdds::Log::Entry& entry) override {
+    // The library calls "error" what we handle and report with more context; keep it findable.
     log_.debug("fastdds {}: {}", entry.context.category, entry.message);
   }
 

@@ -91,10 +91,10 @@ void PlainPublisher::copy_to(WriterHandle& writer, const void* message) {
   }
 }
 
-void PlainPublisher::publish_in_place(void* message) {
+void PlainPublisher::publish_in_place(void* message, std::int64_t publish_stamp_ns) {
   if (shared_is_read()) copy_to(*shared_, message);
-  if ((*in_place_)->write(message, eprosima::fastrtps::rtps::InstanceHandle_t()) !=
-      ReturnCode::RETCODE_OK) {
+  auto parameters = write_parameters(publish_stamp_ns);
+  if (!(*in_place_)->write(message, parameters)) {
     (*in_place_)->discard_loan(message);
     ++unsent_;
   }
@@ -118,7 +118,7 @@ void PlainPublisher::publish_shared(void* message) {
   }
 }
 
-void PlainPublisher::publish(void* message) {
+void PlainPublisher::publish_as_of(void* message, std::int64_t publish_stamp_ns) {
   if (!type_.counters_valid(message)) {
     discard(message);
     throw std::logic_error(fmt::format(
@@ -133,7 +133,7 @@ void PlainPublisher::publish(void* message) {
   if (in_shared_memory) {
     publish_shared(message);
   } else {
-    publish_in_place(message);
+    publish_in_place(message, publish_stamp_ns);
   }
 }
 
