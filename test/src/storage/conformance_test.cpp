@@ -4,6 +4,7 @@
 
 #include <set>
 
+#include "camvox/storage/indexed_reader.hpp"
 #include "camvox/storage/stream_reader.hpp"
 #include "camvox/storage/writer.hpp"
 #include "mcap_files.hpp"
@@ -185,6 +186,52 @@ TEST_F(Conformance, StreamReaderGivesTheRecordsOfAll416Files) {
     EXPECT_TRUE(reader.problems().empty()) << path;
     EXPECT_EQ(lines, read_expected(path).lines) << path;
   }
+}
+
+/// Lines of one type, messages in order of their log time.
+std::vector<Line> select(const std::vector<Line>& lines, const std::string& type) {
+  std::vector<Line> selected;
+  for (const auto& line : lines) {
+    const bool repeated = std::find(selected.begin(), selected.end(), line) != selected.end();
+    if (line.first == type && !(type == "Schema" && repeated)) selected.push_back(line);
+  }
+  if (type != "Message") return selected;
+  std::stable_sort(selected.begin(), selected.end(), [](const Line& a, const Line& b) {
+    return std::stoull(a.second.at("log_time")) < std::stoull(b.second.at("log_time"));
+  });
+  return selected;
+}
+
+/// The suite asks the indexed reader for messages, schemas and statistics, of files with all
+/// indexes; the others must give the same after a scan.
+TEST_F(Conformance, IndexedReaderGivesMessagesSchemasAndStatisticsOfAllFiles) {
+  int indexed = 0;
+  for (const auto& path : files_) {
+    const auto reader = McapIndexedReader::open(path);
+    ASSERT_TRUE(reader.ok()) << reader.status().message();
+    const auto expected = read_expected(path);
+    std::vector<Line> messages;
+    auto cursor = (*reader)->messages();
+    while (const Message* message = cursor.next()) messages.push_back(ToLine()(*message));
+    EXPECT_TRUE(cursor.status().ok()) << path << cursor.status().message();
+    EXPECT_EQ(messages, select(expected.lines, "Message")) << path;
+    std::vector<Line> schemas;
+    for (const auto& [id, schema] : (*reader)->summary().schemas) {
+      schemas.push_back(ToLine()(schema));
+    }
+    EXPECT_EQ(schemas, select(expected.lines, "Schema")) << path;
+    const auto statistics = select(expected.lines, "Statistics");
+    if (!statistics.empty()) {
+      auto actual = ToLine()((*reader)->summary().statistics);
+      EXPECT_EQ(actual, statistics[0]) << path;
+    }
+    const auto has = [&](const char* feature) { return expected.features.contains(feature); };
+    if (!messages.empty() && has("ch") && has("chx") && has("rch") && has("rsh") && has("st")) {
+      EXPECT_FALSE((*reader)->summary().rebuilt) << path;
+      ++indexed;
+    }
+  }
+  EXPECT_EQ(indexed, 16);
 }
 
 McapWriterOptions options_of(const std::set<std::string>& features) {
