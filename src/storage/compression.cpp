@@ -183,7 +183,7 @@ struct Decompressor::State {
   }
 };
 
-Decompressor::Decompressor() : state_(std::make_unique<State>()) {}
+Decompressor::Decompressor() = default;
 Decompressor::~Decompressor() = default;
 Decompressor::Decompressor(Decompressor&&) noexcept = default;
 Decompressor& Decompressor::operator=(Decompressor&&) noexcept = default;
@@ -209,6 +209,7 @@ Status Decompressor::decompress(Compression compression,
                      std::to_string(size));
     }
   }
+  if (!state_) state_ = std::make_unique<State>();
   out.resize(static_cast<std::size_t>(size));
   auto status = compression == Compression::kLz4 ? state_->decompress_lz4(in, out)
                                                  : state_->decompress_zstd(in, out);
@@ -225,6 +226,7 @@ void Decompressor::decompress_prefix(Compression compression,
     out.append(in.first(static_cast<std::size_t>(std::min<std::uint64_t>(in.size(), size))));
     return;
   }
+  if (!state_) state_ = std::make_unique<State>();
   LZ4F_resetDecompressionContext(state_->lz4);
   ZSTD_DCtx_reset(state_->zstd, ZSTD_reset_session_only);
   std::size_t consumed = 0;

@@ -95,18 +95,23 @@ MessageCursor::MessageCursor(const McapIndexedReader& reader, MessageFilter filt
 }
 
 void MessageCursor::select_channels() {
-  channels_.resize(std::numeric_limits<std::uint16_t>::max() + std::size_t{1}, nullptr);
+  const auto& channels = reader_->summary().channels;
   const auto& topics = filter_.topics;
-  for (const auto& [id, channel] : reader_->summary().channels) {
+  if (!channels.empty()) channels_.resize(channels.rbegin()->first + std::size_t{1}, nullptr);
+  for (const auto& [id, channel] : channels) {
     const bool is_wanted =
         topics.empty() || std::find(topics.begin(), topics.end(), channel.topic) != topics.end();
     if (is_wanted) channels_[id] = &channel;
   }
 }
 
+bool MessageCursor::wanted(std::uint16_t channel_id) const {
+  return channel_id < channels_.size() && channels_[channel_id] != nullptr;
+}
+
 bool MessageCursor::wanted(const Message& message) const {
   return message.log_time_ns >= filter_.start_time_ns &&
-         message.log_time_ns <= filter_.end_time_ns && channels_[message.channel_id] != nullptr;
+         message.log_time_ns <= filter_.end_time_ns && wanted(message.channel_id);
 }
 
 bool MessageCursor::wanted(const ChunkIndex& index) const {
@@ -117,7 +122,7 @@ bool MessageCursor::wanted(const ChunkIndex& index) const {
   const auto& offsets = index.message_index_offsets;
   if (offsets.empty() || filter_.topics.empty()) return true;
   return std::any_of(offsets.begin(), offsets.end(), [this](const auto& channel_offset) {
-    return channels_[channel_offset.first] != nullptr;
+    return wanted(channel_offset.first);
   });
 }
 
@@ -296,7 +301,6 @@ const Message* MessageCursor::next() {
     auto run = pop();
     const auto content = message_content(*run, run->entries[run->position].offset);
     ++run->position;
-    const bool loose = run->index == nullptr;
     push(std::move(run));
     std::optional<Message> message;
     if (content.ok()) message = decode_message(*content);
@@ -305,7 +309,8 @@ const Message* MessageCursor::next() {
           content.ok() ? Status(StatusCode::kCorrupt, "a message is too short") : content.status();
       return nullptr;
     }
-    if (loose && !wanted(*message)) continue;
+    // The channel of a loose message is only known now; and the file may have changed.
+    if (!wanted(*message)) continue;
     message_ = *message;
     channel_ = channels_[message_.channel_id];
     return &message_;

@@ -39,12 +39,16 @@ void read(ByteReader& in, Message& r) {
   r.data = in.rest();
 }
 
-void read(ByteReader& in, Chunk& r) {
+void read_fields_before_data(ByteReader& in, Chunk& r) {
   r.message_start_time_ns = in.number<std::uint64_t>();
   r.message_end_time_ns = in.number<std::uint64_t>();
   r.uncompressed_size = in.number<std::uint64_t>();
   r.uncompressed_crc = in.number<std::uint32_t>();
   r.compression = in.string();
+}
+
+void read(ByteReader& in, Chunk& r) {
+  read_fields_before_data(in, r);
   r.records = in.bytes64();
 }
 
@@ -320,6 +324,16 @@ std::optional<Message> decode_message(Bytes content) {
   read(in, message);
   if (!in.ok()) return std::nullopt;
   return message;
+}
+
+std::optional<Chunk> decode_cut_chunk(Bytes content) {
+  Chunk chunk;
+  ByteReader in(content);
+  read_fields_before_data(in, chunk);
+  const auto size = in.number<std::uint64_t>();
+  chunk.records = in.take(std::min<std::uint64_t>(size, in.remaining()));
+  if (!in.ok()) return std::nullopt;
+  return chunk;
 }
 
 void encode_head(Opcode opcode, std::uint64_t length, ByteBuffer& out) {

@@ -57,7 +57,7 @@ class Decompressor {
 
  private:
   struct State;
-  std::unique_ptr<State> state_;
+  std::unique_ptr<State> state_;  ///< Made for the first chunk that is compressed.
 };
 
 }  // namespace camvox::storage

@@ -97,6 +97,7 @@ class MessageCursor {
   void add_loose_messages();
   [[nodiscard]] bool wanted(const ChunkIndex& index) const;
   [[nodiscard]] bool wanted(const Message& message) const;
+  [[nodiscard]] bool wanted(std::uint16_t channel_id) const;
   [[nodiscard]] bool open_due_chunks();
   Status open_chunk(const ChunkIndex& index);
   Status load(Run& run);

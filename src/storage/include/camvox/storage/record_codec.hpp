@@ -20,6 +20,10 @@ inline constexpr std::size_t kFooterRecordSize = kRecordHeadSize + 20;
 /// Only a message; without the variant, for the readers' inner loops.
 [[nodiscard]] std::optional<Message> decode_message(Bytes content);
 
+/// A chunk whose content was cut off: `records` is what is left of them. Nothing when even the
+/// fields before them are incomplete.
+[[nodiscard]] std::optional<Chunk> decode_cut_chunk(Bytes content);
+
 /// Appends the whole record (head and content). A chunk, attachment or message is copied whole.
 void encode_record(const Record& record, ByteBuffer& out);
 
