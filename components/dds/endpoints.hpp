@@ -64,6 +64,7 @@ class WriterHandle : private eprosima::fastdds::dds::DataWriterListener {
   std::shared_ptr<eprosima::fastdds::dds::Topic> topic_;
   std::function<void()> on_match_change_;
   std::atomic<std::size_t> readers_ = 0;
+  std::string guid_;
   eprosima::fastdds::dds::DataWriter* writer_ = nullptr;
 };
 
@@ -89,6 +90,7 @@ class ReaderHandle {
  private:
   std::shared_ptr<Participant> participant_;
   std::shared_ptr<eprosima::fastdds::dds::Topic> topic_;
+  std::string guid_;
   eprosima::fastdds::dds::DataReader* reader_ = nullptr;
 };
 
