@@ -170,6 +170,7 @@ TEST(CycloneInterop, WritesWhatCycloneReads) {
   auto cloud = context.advertise<Cloud>(kCloudPort);
   container.activate();
   auto cyclone = start_cyclone(CYCLONE_PEER, {"subscribe"});
+  ASSERT_TRUE(cyclone.wrote("matched")) << cyclone.output();
   // The internal topic counts the gateway's reader, which is there once a foreign reader is.
   ASSERT_TRUE(wait_until([&] {
     return imu.subscriber_count() > 0 && lidar.subscriber_count() > 0 &&

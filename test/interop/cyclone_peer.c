@@ -162,6 +162,17 @@ static int take_and_check(dds_entity_t reader, const struct channel* channel, in
   return seen;
 }
 
+/* A volatile reader sees nothing of what was written before it knows the writer. */
+static void wait_for_writer(dds_entity_t reader) {
+  dds_subscription_matched_status_t status = {0};
+  const dds_time_t deadline = dds_time() + kPatience;
+  while (status.current_count == 0 && dds_time() < deadline) {
+    dds_get_subscription_matched_status(reader, &status);
+    dds_sleepfor(DDS_MSECS(5));
+  }
+  CHECK(status.current_count > 0);
+}
+
 static void subscribe_all(dds_entity_t participant) {
   dds_entity_t readers[kChannelCount];
   int seen[kChannelCount] = {0};
@@ -172,6 +183,9 @@ static void subscribe_all(dds_entity_t participant) {
     CHECK(readers[c] > 0);
   }
   dds_delete_qos(qos);
+  for (int c = 0; c < kChannelCount; ++c) wait_for_writer(readers[c]);
+  printf("matched\n");
+  fflush(stdout);
   const dds_time_t deadline = dds_time() + kPatience;
   int complete = 0;
   while (complete < kChannelCount && dds_time() < deadline) {
