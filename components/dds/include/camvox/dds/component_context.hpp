@@ -102,7 +102,12 @@ class ComponentContext final : public Context {
 
  private:
   [[nodiscard]] std::string topic_of(const Port& port) const;
+  [[nodiscard]] TopicSettings settings_of(const std::string& topic) const;
   void when_active(std::function<void()> action);
+  Subscription make_ros_subscription(const Port& port,
+                                     MessageType type,
+                                     Callback callback,
+                                     const SubscribeOptions& options);
 
   ComponentSettings settings_;
   Middleware middleware_;
@@ -115,6 +120,7 @@ class ComponentContext final : public Context {
   bool active_ = false;
   std::vector<std::function<void()>> pending_;
   std::vector<std::pair<std::string, Subscription>> subscriptions_;
+  std::vector<std::shared_ptr<void>> border_handles_;  // what the gateway carries for us
 };
 
 }  // namespace camvox::dds

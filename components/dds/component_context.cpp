@@ -1,0 +1,205 @@
+#include "camvox/dds/component_context.hpp"
+
+#include <chrono>
+#include <future>
+
+#include "gateway.hpp"
+#include "plain_publisher.hpp"
+#include "plain_subscription.hpp"
+#include "ros_endpoints.hpp"
+#include "topic_types.hpp"
+
+namespace camvox::dds {
+namespace {
+
+constexpr std::chrono::milliseconds kTearDownTimeout{1000};
+constexpr std::chrono::seconds kParameterTimeout{5};
+
+/// Gives the middleware's threads a logger that lives as long as they do.
+class ForwardingLogger final : public Logger {
+ public:
+  explicit ForwardingLogger(Logger& target) : target_(target) {}
+  void write(LogLevel level, std::string_view text) override { target_.write(level, text); }
+  [[nodiscard]] bool enabled(LogLevel level) const override { return target_.enabled(level); }
+
+ private:
+  Logger& target_;
+};
+
+}  // namespace
+
+Middleware make_middleware(const ParticipantOptions& options,
+                           TopicSettingsMap topics,
+                           Logger& log) {
+  Middleware middleware;
+  middleware.participant = Participant::create(options, log);
+  middleware.gateway =
+      std::make_shared<Gateway>(middleware.participant, std::make_shared<ForwardingLogger>(log));
+  middleware.topics = std::move(topics);
+  return middleware;
+}
+
+ComponentContext::ComponentContext(ComponentSettings settings,
+                                   Middleware middleware,
+                                   std::shared_ptr<Executor> executor,
+                                   std::shared_ptr<Logger> log,
+                                   std::function<void(std::exception_ptr)> on_error)
+    : settings_(std::move(settings)),
+      middleware_(std::move(middleware)),
+      executor_(std::move(executor)),
+      log_(std::move(log)),
+      tenant_(std::make_shared<Tenant>(settings_.name, std::move(on_error))) {}
+
+ComponentContext::~ComponentContext() { deactivate(kTearDownTimeout); }
+
+void ComponentContext::activate() {
+  active_ = true;
+  for (const auto& action : std::exchange(pending_, {})) action();
+}
+
+bool ComponentContext::deactivate(std::chrono::milliseconds timeout) {
+  return executor_->remove(tenant_, timeout);
+}
+
+void ComponentContext::when_active(std::function<void()> action) {
+  if (active_) {
+    action();
+  } else {
+    pending_.push_back(std::move(action));
+  }
+}
+
+std::string ComponentContext::topic_of(const Port& port) const {
+  const auto remapped = settings_.remap.find(port.name);
+  return remapped != settings_.remap.end() ? remapped->second : std::string(port.default_topic);
+}
+
+TopicSettings ComponentContext::settings_of(const std::string& topic) const {
+  const auto found = middleware_.topics.find(topic);
+  return found != middleware_.topics.end() ? found->second : TopicSettings{};
+}
+
+std::int64_t ComponentContext::now_ns() const {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(
+             std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
+
+void ComponentContext::every(std::chrono::nanoseconds period, std::function<void()> callback) {
+  if (period <= std::chrono::nanoseconds::zero()) {
+    throw std::logic_error(name() + ": the period of a timer must be positive");
+  }
+  when_active([this, period, callback = std::move(callback)] {
+    executor_->every(tenant_, period, callback);
+  });
+}
+
+void ComponentContext::post(std::function<void()> callback) {
+  executor_->post(tenant_, std::move(callback));
+}
+
+void ComponentContext::accept_parameters(config::ParameterMap effective,
+                                         std::vector<config::Problem> problems) {
+  if (!problems.empty()) throw config::ConfigError(std::move(problems));
+  effective_ = std::move(effective);
+}
+
+std::vector<config::Problem> ComponentContext::change_parameters(
+    const config::ParameterMap& changes) {
+  if (!change_handler_) {
+    return {{{name(), 0},
+             changes.empty() ? "" : changes.begin()->first,
+             "parameters of this component are fixed after start; change the config and restart"}};
+  }
+  auto done = std::make_shared<std::promise<std::vector<config::Problem>>>();
+  auto problems = done->get_future();
+  executor_->post(tenant_, [this, done, changes] {
+    auto found = change_handler_(changes);
+    for (const auto& [key, parameter] : changes) {
+      if (found.empty()) effective_[key] = parameter;
+    }
+    done->set_value(std::move(found));
+  });
+  if (problems.wait_for(kParameterTimeout) != std::future_status::ready) {
+    return {{{name(), 0}, "", "the component did not answer; a callback of it is still running"}};
+  }
+  return problems.get();
+}
+
+std::vector<PortStats> ComponentContext::subscription_stats() const {
+  std::vector<PortStats> all;
+  for (const auto& [topic, subscription] : subscriptions_) {
+    all.push_back({topic, subscription->stats()});
+  }
+  return all;
+}
+
+std::shared_ptr<PublisherBackend> ComponentContext::make_publisher(const Port& port,
+                                                                   const MessageType& type,
+                                                                   const PublishOptions& options) {
+  const std::string topic = topic_of(port);
+  if (!type.plain) {
+    return std::make_shared<RosPublisher>(middleware_.participant, topic, type, options);
+  }
+  const TopicSettings settings = settings_of(topic);
+  if (settings.interprocess_zero_copy && !middleware_.gateway->may_produce(topic)) {
+    throw std::runtime_error("topic " + topic +
+                             " is read here from another process' shared memory; a container "
+                             "cannot produce such a topic as well");
+  }
+  border_handles_.push_back(middleware_.gateway->add_producer(topic, type, options.qos));
+  return std::make_shared<PlainPublisher>(middleware_.participant, topic, type, options, settings);
+}
+
+Subscription ComponentContext::make_subscription(const Port& port,
+                                                 const MessageType& type,
+                                                 Callback callback,
+                                                 const SubscribeOptions& options) {
+  if (!type.plain) return make_ros_subscription(port, type, std::move(callback), options);
+  const std::string topic = topic_of(port);
+  auto subscription =
+      std::make_shared<PlainSubscription>(middleware_.participant, topic, type, options);
+  const bool shared = settings_of(topic).interprocess_zero_copy;
+  subscriptions_.emplace_back(topic, subscription);
+  // Only once all components are wired is it known whether the topic is produced here.
+  when_active([this, subscription, topic, &type, shared, options, callback = std::move(callback)] {
+    auto& gateway = *middleware_.gateway;
+    if (shared && !gateway.is_produced(topic)) {
+      border_handles_.push_back(gateway.add_shared_consumer(topic, type, options.qos));
+      subscription->add_shared(middleware_.participant, topic, options);
+    } else {
+      border_handles_.push_back(gateway.add_consumer(topic, type, options.qos));
+    }
+    subscription->attach(*executor_, tenant_, callback);
+  });
+  return subscription;
+}
+
+Subscription ComponentContext::make_ros_subscription(const Port& port,
+                                                     MessageType type,
+                                                     Callback callback,
+                                                     const SubscribeOptions& options) {
+  const std::string topic = topic_of(port);
+  auto subscription =
+      std::make_shared<RosSubscription>(middleware_.participant, topic, std::move(type), options);
+  subscriptions_.emplace_back(topic, subscription);
+  when_active([this, subscription, callback = std::move(callback)] {
+    subscription->attach(*executor_, tenant_, callback);
+  });
+  return subscription;
+}
+
+std::shared_ptr<PublisherBackend> ComponentContext::make_raw_publisher(
+    const Port& port, std::string_view type_name, const PublishOptions& options) {
+  return std::make_shared<RosPublisher>(
+      middleware_.participant, topic_of(port), raw_message_type(type_name), options);
+}
+
+Subscription ComponentContext::make_raw_subscription(const Port& port,
+                                                     std::string_view type_name,
+                                                     Callback callback,
+                                                     const SubscribeOptions& options) {
+  return make_ros_subscription(port, raw_message_type(type_name), std::move(callback), options);
+}
+
+}  // namespace camvox::dds

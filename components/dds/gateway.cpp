@@ -1,0 +1,237 @@
+#include "gateway.hpp"
+
+#include "plain_publisher.hpp"
+#include "plain_subscription.hpp"
+#include "topic_types.hpp"
+
+namespace camvox::dds {
+namespace {
+
+using ReturnCode = eprosima::fastrtps::types::ReturnCode_t;
+constexpr std::chrono::milliseconds kDetachTimeout{1000};
+
+std::shared_ptr<Tenant> make_tenant(const std::string& name, const std::shared_ptr<Logger>& log) {
+  return std::make_shared<Tenant>(name, [name, log](std::exception_ptr error) {
+    try {
+      std::rethrow_exception(error);
+    } catch (const std::exception& exception) {
+      log->error("{}: {}", name, exception.what());
+    } catch (...) {
+      log->error("{}: unknown exception", name);
+    }
+  });
+}
+
+}  // namespace
+
+/// Sends a topic of this container out while another process reads it.
+class Gateway::Export : public std::enable_shared_from_this<Export> {
+ public:
+  Export(Gateway& gateway, const std::string& topic, const MessageType& type, const Qos& qos)
+      : participant_(gateway.participant_),
+        executor_(gateway.executor_),
+        log_(gateway.log_),
+        topic_(topic),
+        type_(type),
+        qos_(qos),
+        control_(make_tenant("export " + topic, log_)) {}
+
+  /// Opens the wire side; separate, because matching calls back into shared_from_this.
+  void open() {
+    writer_ = std::make_unique<WriterHandle>(
+        participant_,
+        wire_topic_name(topic_),
+        new WireTopicType(type_.dds_name),
+        wire_writer_qos(qos_),
+        [self = weak_from_this(), executor = executor_, control = control_] {
+          executor->post(control, [self] {
+            if (const auto alive = self.lock()) alive->follow_readers();
+          });
+        });
+  }
+
+  void close() {
+    executor_->remove(control_, kDetachTimeout);
+    if (flow_) executor_->remove(flow_, kDetachTimeout);
+    writer_.reset();
+  }
+
+ private:
+  /// Reads the in-place topic only while somebody outside wants it.
+  void follow_readers() {
+    const bool wanted = writer_->reader_count() > 0;
+    if (wanted == (flow_ != nullptr)) return;
+    if (!wanted) {
+      executor_->remove(std::exchange(flow_, nullptr), kDetachTimeout);
+      return;
+    }
+    flow_ = make_tenant("export " + topic_, log_);
+    SubscribeOptions options;
+    options.qos = qos_;
+    options.max_held = 0;
+    PlainSubscription local(participant_, topic_, type_, options);
+    local.attach(
+        *executor_,
+        flow_,
+        [self = weak_from_this()](const std::shared_ptr<const void>& message, const MessageInfo&) {
+          if (const auto alive = self.lock()) alive->send(message.get());
+        });
+  }
+
+  void send(const void* message) {
+    WireData data{&type_, const_cast<void*>(message)};
+    (*writer_)->write(&data);
+  }
+
+  std::shared_ptr<Participant> participant_;
+  std::shared_ptr<Executor> executor_;
+  std::shared_ptr<Logger> log_;
+  std::string topic_;
+  const MessageType& type_;
+  Qos qos_;
+  std::shared_ptr<Tenant> control_;
+  std::shared_ptr<Tenant> flow_;
+  std::unique_ptr<WriterHandle> writer_;
+};
+
+/// Brings a topic of another process in, into in-place samples.
+class Gateway::Import {
+ public:
+  Import(Gateway& gateway, const std::string& topic, const MessageType& type, const Qos& qos)
+      : executor_(gateway.executor_),
+        log_(gateway.log_),
+        topic_(topic),
+        tenant_(make_tenant("import " + topic, log_)),
+        flow_(std::make_shared<Flow>(gateway, topic, type, qos)) {
+    executor_->add_source(
+        tenant_, flow_->reader.data_condition(), [flow = flow_] { return flow->take_one(); });
+  }
+  Import(const Import&) = delete;
+  Import& operator=(const Import&) = delete;
+  ~Import() { executor_->remove(tenant_, kDetachTimeout); }
+
+ private:
+  struct Flow {
+    Flow(Gateway& gateway,
+         const std::string& topic,
+         const MessageType& message_type,
+         const Qos& qos)
+        : type(message_type),
+          rejected(gateway.rejected_),
+          publisher(gateway.participant_, topic, type, {.qos = qos, .max_loans = 1}, {}),
+          reader(gateway.participant_,
+                 wire_topic_name(topic),
+                 new WireTopicType(type.dds_name),
+                 wire_reader_qos(qos)) {}
+
+    bool take_one() {
+      void* message = publisher.loan();
+      WireData data{&type, message};
+      eprosima::fastdds::dds::SampleInfo info;
+      const auto code = reader->take_next_sample(&data, &info);
+      const bool taken = code == ReturnCode::RETCODE_OK;
+      if (taken && info.valid_data && !data.well_formed) ++*rejected;
+      if (taken && info.valid_data && data.well_formed) {
+        publisher.publish(message);
+      } else {
+        publisher.discard(message);
+      }
+      return taken;
+    }
+
+    const MessageType& type;
+    std::shared_ptr<std::atomic<std::uint64_t>> rejected;
+    PlainPublisher publisher;
+    ReaderHandle reader;
+  };
+
+  std::shared_ptr<Executor> executor_;
+  std::shared_ptr<Logger> log_;
+  std::string topic_;
+  std::shared_ptr<Tenant> tenant_;
+  std::shared_ptr<Flow> flow_;
+};
+
+Gateway::Gateway(std::shared_ptr<Participant> participant, std::shared_ptr<Logger> log)
+    : participant_(std::move(participant)),
+      log_(std::move(log)),
+      rejected_(std::make_shared<std::atomic<std::uint64_t>>(0)),
+      executor_(std::make_shared<Executor>("gateway")) {
+  executor_->start();
+}
+
+Gateway::~Gateway() {
+  for (auto& [topic, entry] : entries_) {
+    if (entry.outgoing) entry.outgoing->close();
+  }
+  entries_.clear();
+  executor_->stop(kDetachTimeout);
+}
+
+std::shared_ptr<void> Gateway::add_producer(const std::string& topic,
+                                            const MessageType& type,
+                                            const Qos& qos) {
+  return add(topic, type, qos, &Entry::producers);
+}
+
+std::shared_ptr<void> Gateway::add_consumer(const std::string& topic,
+                                            const MessageType& type,
+                                            const Qos& qos) {
+  return add(topic, type, qos, &Entry::consumers);
+}
+
+std::shared_ptr<void> Gateway::add_shared_consumer(const std::string& topic,
+                                                   const MessageType& type,
+                                                   const Qos& qos) {
+  return add(topic, type, qos, &Entry::shared_consumers);
+}
+
+bool Gateway::is_produced(const std::string& topic) {
+  const std::lock_guard lock(mutex_);
+  return entries_[topic].producers > 0;
+}
+
+bool Gateway::may_produce(const std::string& topic) {
+  const std::lock_guard lock(mutex_);
+  return entries_[topic].shared_consumers == 0;
+}
+
+std::shared_ptr<void> Gateway::add(const std::string& topic,
+                                   const MessageType& type,
+                                   const Qos& qos,
+                                   int Entry::*role) {
+  {
+    const std::lock_guard lock(mutex_);
+    auto& entry = entries_[topic];
+    const bool first = entry.producers + entry.consumers + entry.shared_consumers == 0;
+    if (first || role == &Entry::producers) entry.qos = qos;
+    entry.type = &type;
+    ++(entry.*role);
+  }
+  update(topic);
+  return {nullptr, [self = shared_from_this(), topic, role](void*) {
+            {
+              const std::lock_guard lock(self->mutex_);
+              --(self->entries_[topic].*role);
+            }
+            self->update(topic);
+          }};
+}
+
+void Gateway::update(const std::string& topic) {
+  const std::lock_guard lock(mutex_);
+  auto& entry = entries_[topic];
+  const bool exported = entry.producers > 0;
+  const bool imported = entry.consumers > 0 && !exported;
+  if (!imported) entry.incoming.reset();
+  if (!exported && entry.outgoing) std::exchange(entry.outgoing, nullptr)->close();
+  if (exported && !entry.outgoing) {
+    entry.outgoing = std::make_shared<Export>(*this, topic, *entry.type, entry.qos);
+    entry.outgoing->open();
+  }
+  if (imported && !entry.incoming) {
+    entry.incoming = std::make_shared<Import>(*this, topic, *entry.type, entry.qos);
+  }
+}
+
+}  // namespace camvox::dds

@@ -1,0 +1,13 @@
+#pragma once
+
+#include <fastdds/dds/domain/qos/DomainParticipantQos.hpp>
+
+#include "camvox/dds/participant.hpp"
+
+namespace camvox::dds {
+
+/// Transports and discovery for the options. Throws std::runtime_error with what is missing.
+[[nodiscard]] eprosima::fastdds::dds::DomainParticipantQos participant_qos(
+    const ParticipantOptions& options);
+
+}  // namespace camvox::dds

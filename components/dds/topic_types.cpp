@@ -1,0 +1,77 @@
+#include "topic_types.hpp"
+
+#include <cstring>
+
+#include "camvox/component/context.hpp"
+
+namespace camvox::dds {
+namespace {
+
+constexpr std::size_t kEncapsulationBytes = 4;
+
+}  // namespace
+
+TopicTypeBase::TopicTypeBase(const std::string& name, std::size_t payload_bytes) {
+  setName(name.c_str());
+  m_typeSize = static_cast<std::uint32_t>(payload_bytes + kEncapsulationBytes);
+  m_isGetKeyDefined = false;
+  auto_fill_type_object(false);
+  auto_fill_type_information(false);
+}
+
+std::function<std::uint32_t()> PlainTopicType::getSerializedSizeProvider(void*) {
+  return [size = m_typeSize] { return size; };
+}
+
+bool WireTopicType::serialize(void* data, SerializedPayload_t* payload) {
+  const auto& wire = *static_cast<WireData*>(data);
+  const std::size_t written = wire.type->write_cdr(wire.message, payload->data, payload->max_size);
+  payload->encapsulation = CDR_LE;
+  payload->length = static_cast<std::uint32_t>(written);
+  return written > 0;
+}
+
+bool WireTopicType::deserialize(SerializedPayload_t* payload, void* data) {
+  auto& wire = *static_cast<WireData*>(data);
+  wire.well_formed = wire.type->read_cdr(payload->data, payload->length, wire.message);
+  return true;
+}
+
+std::function<std::uint32_t()> WireTopicType::getSerializedSizeProvider(void* data) {
+  return [data] {
+    const auto& wire = *static_cast<WireData*>(data);
+    // An invalid message gets no room; serialize() then refuses it.
+    if (!wire.type->counters_valid(wire.message)) return std::uint32_t{0};
+    return static_cast<std::uint32_t>(wire.type->cdr_size(wire.message));
+  };
+}
+
+interfaces::MessageType raw_message_type(std::string_view ros_name) {
+  interfaces::MessageType type;
+  type.ros_name = ros_name;
+  type.dds_name = interfaces::to_dds_type_name(ros_name);
+  type.size = sizeof(RawMessage);
+  type.create = []() -> void* { return new RawMessage; };
+  type.destroy = [](void* message) { delete static_cast<RawMessage*>(message); };
+  type.reset = [](void* message) { static_cast<RawMessage*>(message)->cdr.clear(); };
+  type.copy = [](const void* from, void* to) {
+    *static_cast<RawMessage*>(to) = *static_cast<const RawMessage*>(from);
+  };
+  type.counters_valid = [](const void*) { return true; };
+  type.cdr_size = [](const void* message) {
+    return static_cast<const RawMessage*>(message)->cdr.size();
+  };
+  type.write_cdr = [](const void* message, std::uint8_t* data, std::size_t size) {
+    const auto& cdr = static_cast<const RawMessage*>(message)->cdr;
+    if (cdr.size() > size || cdr.size() < kEncapsulationBytes) return std::size_t{0};
+    std::memcpy(data, cdr.data(), cdr.size());
+    return cdr.size();
+  };
+  type.read_cdr = [](const std::uint8_t* data, std::size_t size, void* message) {
+    static_cast<RawMessage*>(message)->cdr.assign(data, data + size);
+    return size >= kEncapsulationBytes;
+  };
+  return type;
+}
+
+}  // namespace camvox::dds
