@@ -16,13 +16,14 @@ class WiringCheck {
   WiringCheck(const SystemConfig& config, const std::vector<ProbedComponent>& components)
       : config_(config), components_(components) {}
 
-  std::vector<Problem> run() {
+  std::vector<Problem> run(MissingWriters missing) {
     for_each_port([this](std::size_t component, const ProbedPort& port) {
       check_type(component, port);
       if (port.is_output && port.internal) check_single_writer(component, port);
     });
-    for_each_port([this](std::size_t component, const ProbedPort& port) {
-      if (!port.is_output && port.internal && port.required) check_has_writer(component, port);
+    for_each_port([this, missing](std::size_t component, const ProbedPort& port) {
+      const bool needs_writer = !port.is_output && port.internal && port.required;
+      if (needs_writer && missing == MissingWriters::kForbidden) check_has_writer(component, port);
     });
     check_topic_settings();
     return std::move(problems_);
@@ -139,8 +140,9 @@ ProbedComponent probe_plugin(const ComponentConfig& component, PluginLoader& plu
 }  // namespace
 
 std::vector<Problem> check_wiring(const SystemConfig& config,
-                                  const std::vector<ProbedComponent>& components) {
-  return WiringCheck(config, components).run();
+                                  const std::vector<ProbedComponent>& components,
+                                  MissingWriters missing) {
+  return WiringCheck(config, components).run(missing);
 }
 
 ProbedSystem probe_system(const SystemConfig& config, PluginLoader& plugins) {

@@ -41,9 +41,14 @@ struct ProbedSystem {
 /// Checks everything that the file alone does not tell: plugins, parameters, ports, wiring.
 [[nodiscard]] ProbedSystem probe_system(const SystemConfig& config, PluginLoader& plugins);
 
+/// Whether a required input that nothing publishes is a problem.
+enum class MissingWriters { kForbidden, kAllowed };
+
 /// Inputs that nothing feeds, two writers of one internal topic, topics with two types.
-[[nodiscard]] std::vector<Problem> check_wiring(const SystemConfig& config,
-                                                const std::vector<ProbedComponent>& components);
+[[nodiscard]] std::vector<Problem> check_wiring(
+    const SystemConfig& config,
+    const std::vector<ProbedComponent>& components,
+    MissingWriters missing = MissingWriters::kForbidden);
 
 /// The config as it takes effect, all defaults filled in, as a config file with the origin of
 /// each value as a comment.
