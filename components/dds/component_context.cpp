@@ -39,6 +39,25 @@ Middleware make_middleware(const ParticipantOptions& options,
   return middleware;
 }
 
+std::vector<TopicDescription> describe_topics(const std::vector<DiscoveredEndpoint>& endpoints) {
+  static constexpr std::string_view kRosPrefix = "rt/";
+  std::map<std::string, TopicDescription> topics;
+  for (const auto& endpoint : endpoints) {
+    if (!endpoint.topic_name.starts_with(kRosPrefix)) continue;
+    const std::string name = endpoint.topic_name.substr(kRosPrefix.size() - 1);
+    auto& topic = topics[name];
+    topic.name = name;
+    topic.type_name = interfaces::to_ros_type_name(endpoint.type_name);
+    ++(endpoint.is_writer ? topic.publishers : topic.subscribers);
+    if (!endpoint.is_writer) continue;
+    topic.offered.reliable = topic.offered.reliable && endpoint.reliable;
+    topic.offered.latched = topic.offered.latched || endpoint.latched;
+  }
+  std::vector<TopicDescription> sorted;
+  for (auto& [name, topic] : topics) sorted.push_back(std::move(topic));
+  return sorted;
+}
+
 ComponentContext::ComponentContext(ComponentSettings settings,
                                    Middleware middleware,
                                    std::shared_ptr<Executor> executor,
@@ -83,6 +102,14 @@ std::int64_t ComponentContext::now_ns() const {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(
              std::chrono::system_clock::now().time_since_epoch())
       .count();
+}
+
+std::vector<TopicDescription> ComponentContext::topics() const {
+  auto endpoints = middleware_.participant->own_endpoints();
+  for (auto& endpoint : middleware_.participant->discovered_endpoints()) {
+    endpoints.push_back(std::move(endpoint));
+  }
+  return describe_topics(endpoints);
 }
 
 void ComponentContext::every(std::chrono::nanoseconds period, std::function<void()> callback) {

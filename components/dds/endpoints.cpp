@@ -4,6 +4,7 @@
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/publisher/Publisher.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
+#include <sstream>
 #include <stdexcept>
 
 namespace camvox::dds {
@@ -36,6 +37,25 @@ EndpointQos common_qos(const Qos& qos) {
 eprosima::fastrtps::Duration_t to_duration(std::chrono::milliseconds time) {
   return {static_cast<std::int32_t>(time.count() / 1000),
           static_cast<std::uint32_t>(time.count() % 1000 * 1'000'000)};
+}
+
+/// Enters an endpoint of ours in the participant's list; returns its GUID.
+template <typename Endpoint>
+std::string announce(Participant& participant,
+                     const fdds::Topic& topic,
+                     const Endpoint& endpoint,
+                     bool is_writer) {
+  std::ostringstream guid;
+  guid << endpoint.guid();
+  DiscoveredEndpoint entry;
+  entry.topic_name = topic.get_name();
+  entry.type_name = topic.get_type_name();
+  entry.guid = guid.str();
+  entry.is_writer = is_writer;
+  entry.reliable = endpoint.get_qos().reliability().kind == fdds::RELIABLE_RELIABILITY_QOS;
+  entry.latched = endpoint.get_qos().durability().kind != fdds::VOLATILE_DURABILITY_QOS;
+  participant.add_own_endpoint(entry);
+  return entry.guid;
 }
 
 }  // namespace
@@ -97,9 +117,11 @@ WriterHandle::WriterHandle(std::shared_ptr<Participant> participant,
   writer_ = participant_->publisher()->create_datawriter(
       topic_.get(), qos, this, fdds::StatusMask::publication_matched());
   if (writer_ == nullptr) throw std::runtime_error("DDS refused a writer for " + topic_name);
+  guid_ = announce(*participant_, *topic_, *writer_, true);
 }
 
 WriterHandle::~WriterHandle() {
+  participant_->remove_own_endpoint(guid_);
   writer_->set_listener(nullptr);
   participant_->publisher()->delete_datawriter(writer_);
 }
@@ -118,9 +140,13 @@ ReaderHandle::ReaderHandle(std::shared_ptr<Participant> participant,
   reader_ = participant_->subscriber()->create_datareader(topic_.get(), qos);
   if (reader_ == nullptr) throw std::runtime_error("DDS refused a reader for " + topic_name);
   reader_->get_statuscondition().set_enabled_statuses(fdds::StatusMask::data_available());
+  guid_ = announce(*participant_, *topic_, *reader_, false);
 }
 
-ReaderHandle::~ReaderHandle() { participant_->subscriber()->delete_datareader(reader_); }
+ReaderHandle::~ReaderHandle() {
+  participant_->remove_own_endpoint(guid_);
+  participant_->subscriber()->delete_datareader(reader_);
+}
 
 fdds::Condition* ReaderHandle::data_condition() const { return &reader_->get_statuscondition(); }
 
@@ -146,6 +172,12 @@ MessageInfo SequenceTracker::track(const fdds::SampleInfo& info) {
     entry->second = std::max(entry->second, sequence);
   }
   return message;
+}
+
+eprosima::fastrtps::rtps::WriteParams write_parameters(std::int64_t publish_stamp_ns) {
+  eprosima::fastrtps::rtps::WriteParams parameters;
+  if (publish_stamp_ns > 0) parameters.source_timestamp().from_ns(publish_stamp_ns);
+  return parameters;
 }
 
 std::string in_place_topic_name(const Participant& participant, const std::string& topic) {

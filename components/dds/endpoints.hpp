@@ -1,5 +1,7 @@
 #pragma once
 
+#include <fastdds/rtps/common/WriteParams.h>
+
 #include <atomic>
 #include <chrono>
 #include <fastdds/dds/publisher/DataWriter.hpp>
@@ -62,6 +64,7 @@ class WriterHandle : private eprosima::fastdds::dds::DataWriterListener {
   std::shared_ptr<eprosima::fastdds::dds::Topic> topic_;
   std::function<void()> on_match_change_;
   std::atomic<std::size_t> readers_ = 0;
+  std::string guid_;
   eprosima::fastdds::dds::DataWriter* writer_ = nullptr;
 };
 
@@ -87,6 +90,7 @@ class ReaderHandle {
  private:
   std::shared_ptr<Participant> participant_;
   std::shared_ptr<eprosima::fastdds::dds::Topic> topic_;
+  std::string guid_;
   eprosima::fastdds::dds::DataReader* reader_ = nullptr;
 };
 
@@ -113,6 +117,9 @@ struct AtomicStats {
   }
   [[nodiscard]] SubscriptionStats snapshot() const { return {received, lost, rejected, starved}; }
 };
+
+/// Parameters of a write on behalf of somebody who sent the message at that time (ns; 0: now).
+[[nodiscard]] eprosima::fastrtps::rtps::WriteParams write_parameters(std::int64_t publish_stamp_ns);
 
 /// DDS name of a topic's in-place samples: unique to this process, so that no other matches it.
 [[nodiscard]] std::string in_place_topic_name(const Participant& participant,

@@ -70,17 +70,18 @@ class Gateway::Export : public std::enable_shared_from_this<Export> {
     options.qos = qos_;
     options.max_held = 0;
     PlainSubscription local(participant_, topic_, type_, options);
-    local.attach(
-        *executor_,
-        flow_,
-        [self = weak_from_this()](const std::shared_ptr<const void>& message, const MessageInfo&) {
-          if (const auto alive = self.lock()) alive->send(message.get());
-        });
+    local.attach(*executor_,
+                 flow_,
+                 [self = weak_from_this()](const std::shared_ptr<const void>& message,
+                                           const MessageInfo& info) {
+                   if (const auto alive = self.lock()) alive->send(message.get(), info);
+                 });
   }
 
-  void send(const void* message) {
+  void send(const void* message, const MessageInfo& info) {
     WireData data{&type_, const_cast<void*>(message)};
-    (*writer_)->write(&data);
+    auto parameters = write_parameters(info.publish_stamp_ns);
+    (*writer_)->write(&data, parameters);
   }
 
   std::shared_ptr<Participant> participant_;
@@ -132,7 +133,7 @@ class Gateway::Import {
       const bool taken = code == ReturnCode::RETCODE_OK;
       if (taken && info.valid_data && !data.well_formed) ++*rejected;
       if (taken && info.valid_data && data.well_formed) {
-        publisher.publish(message);
+        publisher.publish_as_of(message, info.source_timestamp.to_ns());
       } else {
         publisher.discard(message);
       }

@@ -98,6 +98,7 @@ class LogConsumer final : public fdds::LogConsumer {
  public:
   explicit LogConsumer(Logger& log) : log_(log) {}
   void Consume(const fdds::Log::Entry& entry) override {
+    // The library calls "error" what we handle and report with more context; keep it findable.
     log_.debug("fastdds {}: {}", entry.context.category, entry.message);
   }
 
@@ -121,6 +122,8 @@ struct Participant::Implementation {
   std::string token;
   std::mutex topics_mutex;
   std::map<std::string, TopicUse> topics;
+  std::mutex own_mutex;
+  std::map<std::string, DiscoveredEndpoint> own;
 
   void release(const std::string& name) {
     const std::lock_guard lock(topics_mutex);
@@ -168,6 +171,24 @@ const std::string& Participant::unique_token() const { return implementation_->t
 
 std::vector<DiscoveredEndpoint> Participant::discovered_endpoints() const {
   return implementation_->listener.endpoints();
+}
+
+std::vector<DiscoveredEndpoint> Participant::own_endpoints() const {
+  const std::lock_guard lock(implementation_->own_mutex);
+  std::vector<DiscoveredEndpoint> all;
+  for (const auto& [guid, endpoint] : implementation_->own) all.push_back(endpoint);
+  return all;
+}
+
+void Participant::add_own_endpoint(DiscoveredEndpoint endpoint) {
+  endpoint.participant_name = options_.name;
+  const std::lock_guard lock(implementation_->own_mutex);
+  implementation_->own[endpoint.guid] = std::move(endpoint);
+}
+
+void Participant::remove_own_endpoint(const std::string& guid) {
+  const std::lock_guard lock(implementation_->own_mutex);
+  implementation_->own.erase(guid);
 }
 
 fdds::DomainParticipant* Participant::get() const { return implementation_->participant; }

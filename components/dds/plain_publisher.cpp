@@ -19,12 +19,10 @@ std::unique_ptr<WriterHandle> make_shared_writer(const std::shared_ptr<Participa
     throw std::runtime_error("topic " + topic +
                              ": a latched topic cannot be zero_copy: interprocess");
   }
-  // The hash in the type's name keeps builds with other layouts or capacities apart.
-  return std::make_unique<WriterHandle>(
-      participant,
-      shared_topic_name(topic),
-      new PlainTopicType(type.dds_name + type.type_hash, type.size),
-      shared_writer_qos(options.qos, settings.max_blocking));
+  return std::make_unique<WriterHandle>(participant,
+                                        shared_topic_name(topic),
+                                        make_plain_topic_type(type),
+                                        shared_writer_qos(options.qos, settings.max_blocking));
 }
 
 }  // namespace
@@ -41,7 +39,7 @@ PlainPublisher::PlainPublisher(std::shared_ptr<Participant> participant,
       in_place_(
           std::make_unique<WriterHandle>(participant,
                                          in_place_topic_name(*participant, topic),
-                                         new PlainTopicType(type.dds_name, type.size),
+                                         make_plain_topic_type(type),
                                          in_place_writer_qos(options.qos, options.max_loans))),
       shared_(make_shared_writer(participant, topic, type, options, settings)) {}
 
@@ -93,10 +91,10 @@ void PlainPublisher::copy_to(WriterHandle& writer, const void* message) {
   }
 }
 
-void PlainPublisher::publish_in_place(void* message) {
+void PlainPublisher::publish_in_place(void* message, std::int64_t publish_stamp_ns) {
   if (shared_is_read()) copy_to(*shared_, message);
-  if ((*in_place_)->write(message, eprosima::fastrtps::rtps::InstanceHandle_t()) !=
-      ReturnCode::RETCODE_OK) {
+  auto parameters = write_parameters(publish_stamp_ns);
+  if (!(*in_place_)->write(message, parameters)) {
     (*in_place_)->discard_loan(message);
     ++unsent_;
   }
@@ -120,7 +118,7 @@ void PlainPublisher::publish_shared(void* message) {
   }
 }
 
-void PlainPublisher::publish(void* message) {
+void PlainPublisher::publish_as_of(void* message, std::int64_t publish_stamp_ns) {
   if (!type_.counters_valid(message)) {
     discard(message);
     throw std::logic_error(fmt::format(
@@ -135,7 +133,7 @@ void PlainPublisher::publish(void* message) {
   if (in_shared_memory) {
     publish_shared(message);
   } else {
-    publish_in_place(message);
+    publish_in_place(message, publish_stamp_ns);
   }
 }
 

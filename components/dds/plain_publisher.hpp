@@ -25,7 +25,9 @@ class PlainPublisher final : public PublisherBackend {
   ~PlainPublisher() override;
 
   void* loan() override;
-  void publish(void* message) override;
+  void publish(void* message) override { publish_as_of(message, 0); }
+  /// Publishes for somebody else, who sent the message at that time (ns; 0: now).
+  void publish_as_of(void* message, std::int64_t publish_stamp_ns);
   void discard(void* message) noexcept override;
   [[nodiscard]] std::size_t subscriber_count() const override;
   /// Messages that readers in other processes did not get, because they were too slow.
@@ -35,7 +37,7 @@ class PlainPublisher final : public PublisherBackend {
   [[nodiscard]] bool shared_is_read() const;
   void* loan_from(WriterHandle& writer);
   void publish_shared(void* message);
-  void publish_in_place(void* message);
+  void publish_in_place(void* message, std::int64_t publish_stamp_ns);
   void copy_to(WriterHandle& writer, const void* message);
 
   std::string topic_;

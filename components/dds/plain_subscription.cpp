@@ -56,7 +56,7 @@ PlainSubscription::PlainSubscription(const std::shared_ptr<Participant>& partici
           // +1: the sample that the callback is looking at
           std::make_shared<ReaderHandle>(participant,
                                          in_place_topic_name(*participant, topic),
-                                         new PlainTopicType(type.dds_name, type.size),
+                                         make_plain_topic_type(type),
                                          in_place_reader_qos(options.qos, options.max_held + 1)),
           type,
           true,
@@ -73,11 +73,10 @@ void PlainSubscription::add_shared(const std::shared_ptr<Participant>& participa
                     options.max_held));
   }
   shared_ = std::make_shared<PlainSource>(
-      std::make_shared<ReaderHandle>(
-          participant,
-          shared_topic_name(topic),
-          new PlainTopicType(type_.dds_name + type_.type_hash, type_.size),
-          shared_reader_qos(options.qos, options.max_held + 1)),
+      std::make_shared<ReaderHandle>(participant,
+                                     shared_topic_name(topic),
+                                     make_plain_topic_type(type_),
+                                     shared_reader_qos(options.qos, options.max_held + 1)),
       type_,
       false,
       stats_);

@@ -23,6 +23,10 @@ std::function<std::uint32_t()> PlainTopicType::getSerializedSizeProvider(void*) 
   return [size = m_typeSize] { return size; };
 }
 
+PlainTopicType* make_plain_topic_type(const interfaces::MessageType& type) {
+  return new PlainTopicType(type.dds_name + "in_place/" + type.type_hash, type.size);
+}
+
 bool WireTopicType::serialize(void* data, SerializedPayload_t* payload) {
   const auto& wire = *static_cast<WireData*>(data);
   const std::size_t written = wire.type->write_cdr(wire.message, payload->data, payload->max_size);

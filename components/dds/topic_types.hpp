@@ -35,6 +35,10 @@ class PlainTopicType final : public TopicTypeBase {
   void deleteData(void* data) override { ::operator delete(data); }
 };
 
+/// The in-place topic type of a plain message. Its name differs from the wire type's (a participant
+/// knows one type a name), and holds the hash, which keeps builds with other layouts apart.
+[[nodiscard]] PlainTopicType* make_plain_topic_type(const interfaces::MessageType& type);
+
 /// What WireTopicType is given as "data": a message and how it is coded.
 struct WireData {
   const interfaces::MessageType* type = nullptr;

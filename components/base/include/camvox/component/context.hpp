@@ -71,6 +71,15 @@ struct RawMessage {
   std::vector<std::uint8_t> cdr;  ///< With the four-byte encapsulation.
 };
 
+/// A topic on the wire, as discovery sees it: ROS types, and internal topics as ROS 2 sees them.
+struct TopicDescription {
+  std::string name;       ///< ROS name, "/livox/lidar".
+  std::string type_name;  ///< ROS name, "sensor_msgs/msg/PointCloud2".
+  Qos offered;            ///< Of its publishers: the weakest reliability, the strongest durability.
+  std::size_t publishers = 0;
+  std::size_t subscribers = 0;
+};
+
 /// Everything that a component sees of the world outside. The container implements it over DDS,
 /// unit tests with camvox::FakeContext.
 class Context {
@@ -151,6 +160,9 @@ class Context {
         },
         options);
   }
+
+  /// All topics that this process or another one publishes or reads at the moment, by name.
+  [[nodiscard]] virtual std::vector<TopicDescription> topics() const { return {}; }
 
   /// Calls back periodically on the component's thread, until the component ends. A call that is
   /// late by more than a period is skipped, not made up for.

@@ -40,6 +40,10 @@ struct ComponentSettings {
   std::map<std::string, std::string, std::less<>> remap;  ///< Port name -> topic name.
 };
 
+/// The ROS-visible topics among the endpoints, sorted by name.
+[[nodiscard]] std::vector<TopicDescription> describe_topics(
+    const std::vector<DiscoveredEndpoint>& endpoints);
+
 /// Counters of one subscription of a component, for diagnostics and `topic info`.
 struct PortStats {
   std::string topic;
@@ -75,6 +79,7 @@ class ComponentContext final : public Context {
   [[nodiscard]] Logger& log() override { return *log_; }
   [[nodiscard]] Diagnostics& diagnostics() override { return diagnostics_; }
   [[nodiscard]] std::int64_t now_ns() const override;
+  [[nodiscard]] std::vector<TopicDescription> topics() const override;
   void every(std::chrono::nanoseconds period, std::function<void()> callback) override;
   void post(std::function<void()> callback) override;
 

@@ -39,7 +39,7 @@ struct ParticipantOptions {
 /// where they are set. Throws std::runtime_error naming a variable with an impossible value.
 [[nodiscard]] ParticipantOptions with_ros_environment(ParticipantOptions options);
 
-/// An endpoint of another participant (or of this one) that discovery told of.
+/// A reader or writer on the domain.
 struct DiscoveredEndpoint {
   std::string topic_name;  ///< As on the wire, e.g. "rt/tf".
   std::string type_name;   ///< As on the wire, e.g. "tf2_msgs::msg::dds_::TFMessage_".
@@ -63,8 +63,12 @@ class Participant {
   [[nodiscard]] const ParticipantOptions& options() const { return options_; }
   /// Names topics that must not match outside of this process; unique in the domain.
   [[nodiscard]] const std::string& unique_token() const;
-  /// True if the endpoint with this GUID prefix text belongs to this participant.
+  /// Endpoints of other participants, in the order of their GUIDs.
   [[nodiscard]] std::vector<DiscoveredEndpoint> discovered_endpoints() const;
+  /// Endpoints of this participant.
+  [[nodiscard]] std::vector<DiscoveredEndpoint> own_endpoints() const;
+  void add_own_endpoint(DiscoveredEndpoint endpoint);
+  void remove_own_endpoint(const std::string& guid);
 
   [[nodiscard]] eprosima::fastdds::dds::DomainParticipant* get() const;
   [[nodiscard]] eprosima::fastdds::dds::Publisher* publisher() const;
