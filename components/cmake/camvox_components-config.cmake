@@ -1,4 +1,4 @@
-# find_package(camvox_components): imported targets camvox::component and camvox::dds.
+# find_package(camvox_components): imported targets camvox::component, camvox::fake_context, camvox::dds.
 include(CMakeFindDependencyMacro)
 find_dependency(camvox)
 find_dependency(camvox_interfaces)

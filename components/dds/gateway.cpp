@@ -36,8 +36,22 @@ class Gateway::Export : public std::enable_shared_from_this<Export> {
         qos_(qos),
         control_(make_tenant("export " + topic, log_)) {}
 
-  /// Opens the wire side; separate, because matching calls back into shared_from_this.
+  /// Opens the wire side on the gateway's thread, where all else of an export happens as well: a
+  /// match may be reported before the writer's constructor has returned.
   void open() {
+    executor_->post(control_, [self = weak_from_this()] {
+      if (const auto alive = self.lock()) alive->open_writer();
+    });
+  }
+
+  void close() {
+    executor_->remove(control_, kDetachTimeout);
+    if (flow_) executor_->remove(flow_, kDetachTimeout);
+    writer_.reset();
+  }
+
+ private:
+  void open_writer() {
     writer_ = std::make_unique<WriterHandle>(
         participant_,
         wire_topic_name(topic_),
@@ -50,13 +64,6 @@ class Gateway::Export : public std::enable_shared_from_this<Export> {
         });
   }
 
-  void close() {
-    executor_->remove(control_, kDetachTimeout);
-    if (flow_) executor_->remove(flow_, kDetachTimeout);
-    writer_.reset();
-  }
-
- private:
   /// Reads the in-place topic only while somebody outside wants it.
   void follow_readers() {
     const bool wanted = writer_->reader_count() > 0;

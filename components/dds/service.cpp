@@ -19,6 +19,7 @@ using ReturnCode = eprosima::fastrtps::types::ReturnCode_t;
 
 constexpr std::chrono::milliseconds kClientMatchTimeout{500};
 constexpr std::chrono::milliseconds kPollPeriod{2};
+constexpr std::chrono::milliseconds kTearDownTimeout{1000};
 
 std::string request_topic(const std::string& service) { return "rq" + service + "Request"; }
 std::string reply_topic(const std::string& service) { return "rr" + service + "Reply"; }
@@ -88,19 +89,22 @@ struct ServiceServer::Implementation {
 
 ServiceServer::ServiceServer(std::shared_ptr<Participant> participant,
                              Executor& executor,
-                             std::shared_ptr<Tenant> tenant,
+                             const std::shared_ptr<Tenant>& tenant,
                              const std::string& name,
                              const interfaces::MessageType& request_type,
                              const interfaces::MessageType& response_type,
                              Handler handler)
-    : implementation_(std::make_shared<Implementation>(
+    : executor_(executor),
+      tenant_(std::make_shared<Tenant>(
+          name, [tenant](std::exception_ptr error) { tenant->report(error); })),
+      implementation_(std::make_shared<Implementation>(
           participant, name, request_type, response_type, std::move(handler))) {
-  executor.add_source(std::move(tenant),
-                      implementation_->requests.data_condition(),
-                      [state = implementation_] { return state->take_one(); });
+  executor_.add_source(tenant_,
+                       implementation_->requests.data_condition(),
+                       [state = implementation_] { return state->take_one(); });
 }
 
-ServiceServer::~ServiceServer() = default;
+ServiceServer::~ServiceServer() { executor_.remove(tenant_, kTearDownTimeout); }
 
 bool call_service(const std::shared_ptr<Participant>& participant,
                   const std::string& name,

@@ -12,7 +12,7 @@ import argparse
 import pathlib
 import sys
 
-from ros_messages import load_ros_packages, rihs01, schema_text
+from ros_messages import DefinitionError, load_ros_packages, rihs01, schema_text
 from plain_types import load_plain_package
 
 IDL_PRIMITIVES = {
@@ -106,8 +106,11 @@ def main():
     parser.add_argument("--idl", required=True, type=pathlib.Path)
     parser.add_argument("--out", required=True, type=pathlib.Path)
     options = parser.parse_args()
-    packages = load_ros_packages(options.msg)
-    plain = load_plain_package(options.idl)
+    try:
+        packages = load_ros_packages(options.msg)
+        plain = load_plain_package(options.idl)
+    except DefinitionError as error:
+        sys.exit(f"error: {error}")
     packages[plain.name] = plain
     for name, package in packages.items():
         idl = options.idl.read_text() if package.plain else package_idl(package)

@@ -6,17 +6,13 @@ which every list is a bounded sequence and its counter is gone, so any ROS 2 too
 import re
 
 from rosidl_adapter.parser import parse_message_string
-from ros_messages import Message, Package
+from ros_messages import DefinitionError, Message, Package
 
 # IDL type: (ROS type, bytes)
 PRIMITIVES = {"octet": ("uint8", 1), "char": ("uint8", 1), "float": ("float32", 4), "double": ("float64", 8),
               "unsigned long": ("uint32", 4), "long": ("int32", 4),
               "unsigned long long": ("uint64", 8), "long long": ("int64", 8)}
 MEMBER = re.compile(r"^((?:unsigned )?[\w:]+(?: long)?(?: long)?) (\w+)((?:\[[\w:]+\])*)$")
-
-
-class PlainError(ValueError):
-    """A struct in the IDL breaks a rule of plain types."""
 
 
 class Member:
@@ -86,17 +82,52 @@ def _check_layout(name, members, sizes):
     for member in members:
         size, alignment = sizes[member.kind]
         if offset % alignment:
-            raise PlainError(f"{name}.{member.name}: offset {offset} is not a multiple of {alignment}; "
-                             "put larger members first or add padding")
+            raise DefinitionError(f"{name}.{member.name}: offset {offset} is not a multiple of {alignment}; "
+                                  "put larger members first or add padding")
         offset += size * member.elements
         widest = max(widest, alignment)
     if offset % widest:
-        raise PlainError(f"{name}: size {offset} is not a multiple of {widest}; add padding at the end")
+        raise DefinitionError(f"{name}: size {offset} is not a multiple of {widest}; add padding at the end")
     return offset, widest
 
 
+def _check_lists(name, members):
+    """Rows of a list are primitives, and its counter is what the codec counts with."""
+    for member in members:
+        counters = [m for m in members if m.name == member.name + "_count" and member.dimensions]
+        if not counters:
+            continue
+        if member.kind not in PRIMITIVES:
+            raise DefinitionError(f"{name}.{member.name}: a list must have rows of primitives, not of {member.kind}")
+        if counters[0].kind != "unsigned long" or counters[0].dimensions:
+            raise DefinitionError(f"{name}.{counters[0].name}: the counter of a list must be an unsigned long")
+    lower = [m.name.lower() for m in members]
+    for ros_name in lower:
+        if lower.count(ros_name) > 1:
+            raise DefinitionError(f"{name}: two members are called '{ros_name}' in ROS, where names are lower case")
+
+
+def _bound(text, constants, place):
+    name = text.split("::")[-1]
+    if not name.isdigit() and name not in constants:
+        raise DefinitionError(f"{place}: the capacity '{text}' is not a constant of this file")
+    return int(name) if name.isdigit() else constants[name]
+
+
+def _read_struct(name, body, constants, sizes):
+    members = []
+    for statement in filter(None, (" ".join(s.split()) for s in body.split(";"))):
+        match = MEMBER.match(statement)
+        if not match or (match[1] not in PRIMITIVES and match[1] not in sizes):
+            raise DefinitionError(f"{name}: '{statement}' is not a plain member")
+        bounds = re.findall(r"\[([\w:]+)\]", match[3])
+        dimensions = [_bound(bound, constants, f"{name}.{match[2]}") for bound in bounds]
+        members.append(Member(match[1], match[2], dimensions))
+    return members
+
+
 def load_plain_package(path):
-    """Package of all structs of the IDL file; raises PlainError with what breaks a rule and where."""
+    """Package of all structs of the IDL file; raises DefinitionError with what breaks a rule and where."""
     text = re.sub(r"//[^\n]*", "", path.read_text())
     package = Package(path.stem)
     package.plain = True
@@ -104,14 +135,9 @@ def load_plain_package(path):
                  for name, value in re.findall(r"const [\w ]+? (\w+)\s*=\s*(\d+)\s*;", text)}
     sizes = {kind: (size, size) for kind, (_, size) in PRIMITIVES.items()}
     for name, body in re.findall(r"struct (\w+)\s*\{([^}]*)\}", text):
-        members = []
-        for statement in filter(None, (" ".join(s.split()) for s in body.split(";"))):
-            match = MEMBER.match(statement)
-            if not match or (match[1] not in PRIMITIVES and match[1] not in sizes):
-                raise PlainError(f"{path.name}: {name}: '{statement}' is not a plain member")
-            dimensions = [int(constants.get(d.split("::")[-1], d) if not d.isdigit() else d)
-                          for d in re.findall(r"\[([\w:]+)\]", match[3])]
-            members.append(Member(match[1], match[2], dimensions))
-        sizes[f"{package.name}::msg::{name}"] = _check_layout(name, members, sizes)
+        place = f"{path.name}: {name}"
+        members = _read_struct(place, body, constants, sizes)
+        _check_lists(place, members)
+        sizes[f"{package.name}::msg::{name}"] = _check_layout(place, members, sizes)
         package.messages.append(PlainMessage(package.name, name, members))
     return package

@@ -12,6 +12,10 @@ NESTED = 1
 ARRAY, BOUNDED_SEQUENCE, SEQUENCE = 48, 96, 144
 
 
+class DefinitionError(ValueError):
+    """A message definition is wrong; the text says where and why."""
+
+
 class Message:
     """One message: fields as rosidl_adapter gives them, and its own definition text."""
 
@@ -49,7 +53,8 @@ class Package:
             ready = [m for m in pending
                      if all(d in done for d in m.dependencies() if d.startswith(self.name + "/"))]
             if not ready:
-                raise ValueError(f"{self.name}: a message contains itself or an unknown one")
+                names = ", ".join(m.full_name for m in pending)
+                raise DefinitionError(f"{names}: contains itself, or a message that is not defined")
             ordered += ready
             pending = [m for m in pending if m not in ready]
         self.messages = ordered
@@ -59,9 +64,17 @@ def _placeholder():
     return parse_message_string("x", "X", "uint8 structure_needs_at_least_one_member").fields
 
 
-def _load_service(package, path):
+def _parse(parse, package, path):
+    """What rosidl makes of a file; its errors do not name the file."""
     text = path.read_text()
-    service = parse_service_string(package.name, path.stem, text)
+    try:
+        return parse(package.name, path.stem, text), text
+    except Exception as error:  # rosidl_adapter has no common base for its errors
+        raise DefinitionError(f"{path}: {error or type(error).__name__}") from error
+
+
+def _load_service(package, path):
+    service, text = _parse(parse_service_string, package, path)
     request_text, _, response_text = text.partition("---\n")
     for part, body, suffix in ((service.request, request_text, "_Request"),
                                (service.response, response_text, "_Response")):
@@ -75,22 +88,27 @@ def load_ros_packages(folder):
     for directory in sorted(p for p in folder.iterdir() if p.is_dir()):
         package = Package(directory.name)
         for path in sorted(directory.glob("msg/*.msg")):
-            spec = parse_message_string(package.name, path.stem, path.read_text())
+            spec, text = _parse(parse_message_string, package, path)
             package.messages.append(
-                Message(package.name, "msg", path.stem, spec.fields or _placeholder(), path.read_text()))
+                Message(package.name, "msg", path.stem, spec.fields or _placeholder(), text))
         for path in sorted(directory.glob("srv/*.srv")):
             _load_service(package, path)
         package.sort()
         packages[package.name] = package
+    for message in (m for package in packages.values() for m in package.messages):
+        for name in message.dependencies():
+            if find(name, packages) is None:
+                raise DefinitionError(f"{message.full_name}: there is no definition of {name}")
     return packages
 
 
 def find(full_name, packages):
+    """The message of that name, or None."""
     package, namespace, name = full_name.split("/")
-    for message in packages[package].messages:
+    for message in packages[package].messages if package in packages else ():
         if (message.namespace, message.name) == (namespace, name):
             return message
-    raise KeyError(full_name)
+    return None
 
 
 def _closure(message, packages):

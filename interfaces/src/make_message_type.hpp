@@ -3,6 +3,7 @@
 #include <fastcdr/Cdr.h>
 #include <fastcdr/FastBuffer.h>
 
+#include <algorithm>
 #include <exception>
 #include <stdexcept>
 #include <string>
@@ -74,6 +75,9 @@ std::size_t ros_cdr_size(const void* message) {
 template <typename T>
 std::size_t ros_write_cdr(const void* message, std::uint8_t* data, std::size_t size) {
   using eprosima::fastcdr::Cdr;
+  // Fast CDR steps over alignment gaps; what was in the buffer before must not leave the process,
+  // and the same message must give the same bytes.
+  std::memset(data, 0, std::min(size, ros_cdr_size<T>(message)));
   try {
     eprosima::fastcdr::FastBuffer buffer(reinterpret_cast<char*>(data), size);
     Cdr cdr(buffer, Cdr::DEFAULT_ENDIAN, Cdr::DDS_CDR);
@@ -88,6 +92,8 @@ std::size_t ros_write_cdr(const void* message, std::uint8_t* data, std::size_t s
 template <typename T>
 bool ros_read_cdr(const std::uint8_t* data, std::size_t size, void* message) {
   using eprosima::fastcdr::Cdr;
+  // Fast CDR would take parameter lists (2, 3) for structs.
+  if (size < kEncapsulationBytes || data[0] != 0 || data[1] > kCdrLittleEndian) return false;
   try {
     auto* bytes = reinterpret_cast<char*>(const_cast<std::uint8_t*>(data));
     eprosima::fastcdr::FastBuffer buffer(bytes, size);

@@ -23,6 +23,8 @@ class Tenant {
 
   [[nodiscard]] const std::string& name() const { return name_; }
   void invoke(const std::function<void()>& callback);
+  /// Hands an exception to `on_error`.
+  void report(std::exception_ptr error) const { on_error_(error); }
   void close() { open_ = false; }
   [[nodiscard]] bool open() const { return open_; }
   /// How long the callback that runs now has been running; zero when none does.

@@ -18,9 +18,11 @@ class ServiceServer {
  public:
   using Handler = std::function<void(const void* request, void* response)>;
 
+  /// The handler runs on the executor's thread; its exceptions go to the tenant. The executor
+  /// must outlive the server.
   ServiceServer(std::shared_ptr<Participant> participant,
                 Executor& executor,
-                std::shared_ptr<Tenant> tenant,
+                const std::shared_ptr<Tenant>& tenant,
                 const std::string& name,
                 const interfaces::MessageType& request_type,
                 const interfaces::MessageType& response_type,
@@ -31,6 +33,8 @@ class ServiceServer {
 
  private:
   struct Implementation;
+  Executor& executor_;
+  std::shared_ptr<Tenant> tenant_;  // of its own, so that it can end alone
   std::shared_ptr<Implementation> implementation_;
 };
 
