@@ -1,9 +1,12 @@
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <functional>
 #include <stdexcept>
 #include <string>
+
+namespace CLI {
+class App;
+}
 
 /// What the command groups of `camvox` have in common. Each group adds its words to the parser; a
 /// word that was chosen leaves its action, which main runs.

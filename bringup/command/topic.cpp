@@ -1,5 +1,6 @@
 #include "topic.hpp"
 
+#include <CLI/CLI.hpp>
 #include <memory>
 
 namespace camvox::command {
