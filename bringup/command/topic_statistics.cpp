@@ -1,10 +1,8 @@
 #include <fmt/format.h>
 
-#include <cstring>
-#include <optional>
-
 #include "running_statistics.hpp"
 #include "topic.hpp"
+#include "topic_messages.hpp"
 #include "topic_reader.hpp"
 
 namespace camvox::command {
@@ -15,8 +13,10 @@ using Clock = std::chrono::steady_clock;
 
 double now_s() { return std::chrono::duration<double>(Clock::now().time_since_epoch()).count(); }
 
-double wall_now_s() {
-  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+std::int64_t wall_now_ns() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(
+             std::chrono::system_clock::now().time_since_epoch())
+      .count();
 }
 
 /// Reads a topic with a print every second and one at the end, if there is news.
@@ -67,48 +67,13 @@ std::string human_size(double bytes) {
   return fmt::format("{:.2f} MB", 1e-6 * bytes);
 }
 
-/// The first field of a message definition: "std_msgs/Header header".
-std::string first_field(std::string_view schema) {
-  while (!schema.empty()) {
-    const auto line = schema.substr(0, schema.find('\n'));
-    schema.remove_prefix(std::min(schema.size(), line.size() + 1));
-    const bool is_constant = line.find('=') != std::string_view::npos;
-    if (!line.empty() && line.front() != '#' && !is_constant) return std::string(line);
-  }
-  return {};
+/// header.stamp of either kind: of ROS 2 messages, and of our internal ones.
+std::int64_t stamp_ns(const storage::CdrValue& message, const TopicInfo& topic) {
+  if (const auto stamp = storage::header_stamp_ns(message)) return *stamp;
+  const auto internal = message.at("header.stamp_ns");
+  if (internal && internal->as_integer()) return *internal->as_integer();
+  throw CommandError("messages of type " + topic.type_name + " have no header.stamp");
 }
-
-/// Reads header.stamp from serialised messages of one type; throws if the type has none.
-class StampReader {
- public:
-  explicit StampReader(const std::string& type_name) {
-    const auto* type = interfaces::find_message_type(type_name);
-    if (type == nullptr) throw CommandError("type " + type_name + " is not known here");
-    const auto field = first_field(type->schema);
-    is_ns_ = field.starts_with("MessageHeader ");
-    if (!is_ns_ && !field.starts_with("std_msgs/Header ") && !field.starts_with("Header ")) {
-      throw CommandError("messages of type " + type_name + " have no header.stamp");
-    }
-  }
-
-  [[nodiscard]] std::optional<double> stamp_s(const std::vector<std::uint8_t>& cdr) const {
-    constexpr std::size_t kEncapsulation = 4;
-    if (cdr.size() < kEncapsulation + 8) return std::nullopt;
-    if (is_ns_) return 1e-9 * static_cast<double>(read<std::int64_t>(cdr, kEncapsulation));
-    return static_cast<double>(read<std::int32_t>(cdr, kEncapsulation)) +
-           1e-9 * static_cast<double>(read<std::uint32_t>(cdr, kEncapsulation + 4));
-  }
-
- private:
-  template <typename T>
-  static T read(const std::vector<std::uint8_t>& cdr, std::size_t offset) {
-    T value;
-    std::memcpy(&value, cdr.data() + offset, sizeof(T));
-    return value;
-  }
-
-  bool is_ns_ = false;
-};
 
 }  // namespace
 
@@ -158,14 +123,15 @@ int topic_bw(const CommonOptions& common, const TopicOptions& options) {
 int topic_delay(const CommonOptions& common, const TopicOptions& options) {
   const Session session(common);
   const auto topic = find_published_topic(session, options.topic);
-  const StampReader stamps(topic.type_name);
+  const MessageDecoder decoder(topic.type_name);
   Window delays_s(window_of(options, 10000));
   return measure(
       options,
       session,
       topic,
       [&](const RawMessage& message) {
-        if (const auto stamp_s = stamps.stamp_s(message.cdr)) delays_s.add(wall_now_s() - *stamp_s);
+        const auto now_ns = wall_now_ns();
+        delays_s.add(1e-9 * static_cast<double>(now_ns - stamp_ns(decoder.decode(message), topic)));
       },
       [&] {
         if (!delays_s.empty()) print_spread("average delay", delays_s.mean(), delays_s);
