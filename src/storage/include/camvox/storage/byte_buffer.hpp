@@ -6,6 +6,7 @@
 #include <memory>
 #include <span>
 #include <string_view>
+#include <utility>
 
 namespace camvox::storage {
 
@@ -24,6 +25,14 @@ using Bytes = std::span<const std::byte>;
 /// when cleared: a 2.6 MB image is then copied once, not cleared first.
 class ByteBuffer {
  public:
+  ByteBuffer() = default;
+  /// The other is empty afterwards.
+  ByteBuffer(ByteBuffer&& other) noexcept { swap(other); }
+  ByteBuffer& operator=(ByteBuffer&& other) noexcept {
+    ByteBuffer(std::move(other)).swap(*this);
+    return *this;
+  }
+
   [[nodiscard]] std::byte* data() { return data_.get(); }
   [[nodiscard]] std::size_t size() const { return size_; }
   [[nodiscard]] std::size_t capacity() const { return capacity_; }
@@ -49,6 +58,12 @@ class ByteBuffer {
   }
 
  private:
+  void swap(ByteBuffer& other) noexcept {
+    std::swap(data_, other.data_);
+    std::swap(size_, other.size_);
+    std::swap(capacity_, other.capacity_);
+  }
+
   void grow(std::size_t size) {
     const std::size_t capacity = std::max(size, capacity_ + capacity_ / 2);
     auto data = std::make_unique_for_overwrite<std::byte[]>(capacity);

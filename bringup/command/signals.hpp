@@ -1,0 +1,68 @@
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <optional>
+#include <thread>
+
+namespace camvox::command {
+
+/// Keeps SIGINT and SIGTERM for StopSignal; called before any thread is made.
+void block_stop_signals();
+
+/// A latch that threads and signals open: a file descriptor to wait for.
+class Event {
+ public:
+  Event();
+  Event(const Event&) = delete;
+  Event& operator=(const Event&) = delete;
+  ~Event();
+  void set();
+  [[nodiscard]] int fd() const { return fd_; }
+
+ private:
+  int fd_;
+};
+
+/// Waits for SIGINT, SIGTERM, or a request of the program itself.
+class StopSignal {
+ public:
+  StopSignal();
+  StopSignal(const StopSignal&) = delete;
+  StopSignal& operator=(const StopSignal&) = delete;
+  ~StopSignal();
+
+  /// True: it is time to stop. False: the timeout came first. No timeout: waits for ever.
+  bool wait(std::optional<std::chrono::milliseconds> timeout = {});
+  /// Ends the wait; from any thread.
+  void request() { requested_.set(); }
+
+ private:
+  int signals_;
+  Event requested_;
+};
+
+/// Receives the signals of a process that must end soon after the first: if it does not,
+/// `on_overdue` says what hangs and the process exits with kUnclean. A second signal exits at once.
+class ExitGuard {
+ public:
+  ExitGuard(std::chrono::milliseconds patience, std::function<void()> on_overdue);
+  ExitGuard(const ExitGuard&) = delete;
+  ExitGuard& operator=(const ExitGuard&) = delete;
+  ~ExitGuard();
+
+  /// Waits for the first signal.
+  void wait();
+
+ private:
+  void watch();
+
+  std::chrono::milliseconds patience_;
+  std::function<void()> on_overdue_;
+  StopSignal signal_;
+  Event asked_;
+  Event over_;
+  std::thread thread_;
+};
+
+}  // namespace camvox::command

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "camvox/bringup/plugin_loader.hpp"
+#include "camvox/bringup/system_config.hpp"
+#include "camvox/component/component.hpp"
+
+namespace camvox::bringup {
+
+/// One input or output that a component asked for.
+struct ProbedPort {
+  std::string name;       ///< In `remap`.
+  std::string topic;      ///< After remapping.
+  std::string type_name;  ///< "sensor_msgs/msg/Imu"
+  bool is_output = false;
+  bool internal = false;  ///< A plain type: stays in the container, no drivers publish it.
+  bool required = false;  ///< Inputs only.
+};
+
+/// What one component would do, learnt by constructing it once without middleware.
+struct ProbedComponent {
+  std::string name;
+  std::vector<ProbedPort> ports;
+  ParameterMap effective_parameters;  ///< Defaults included; origin "default" or from the file.
+  std::vector<Problem> problems;      ///< Parameters, unknown ports, a constructor that throws.
+};
+
+/// Constructs and destroys a component on a recording context.
+[[nodiscard]] ProbedComponent probe_component(const ComponentConfig& component,
+                                              ComponentFactory& factory);
+
+/// A config with what its components ask for.
+struct ProbedSystem {
+  std::vector<ProbedComponent> components;  ///< In the order of the config.
+  std::vector<Problem> problems;            ///< Sorted by line.
+};
+
+/// Checks everything that the file alone does not tell: plugins, parameters, ports, wiring.
+[[nodiscard]] ProbedSystem probe_system(const SystemConfig& config, PluginLoader& plugins);
+
+/// Whether a required input that nothing publishes is a problem.
+enum class MissingWriters { kForbidden, kAllowed };
+
+/// Inputs that nothing feeds, two writers of one internal topic, topics with two types.
+[[nodiscard]] std::vector<Problem> check_wiring(
+    const SystemConfig& config,
+    const std::vector<ProbedComponent>& components,
+    MissingWriters missing = MissingWriters::kForbidden);
+
+/// The config as it takes effect, all defaults filled in, as a config file with the origin of
+/// each value as a comment.
+[[nodiscard]] std::string effective_config(const SystemConfig& config,
+                                           const std::vector<ProbedComponent>& components);
+
+}  // namespace camvox::bringup

@@ -1,0 +1,228 @@
+#include "component_slot.hpp"
+
+#include <fmt/format.h>
+
+#include <vector>
+
+namespace camvox::bringup {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr auto kFirstBackOff = 100ms;
+constexpr std::chrono::milliseconds kLongestBackOff = 5s;
+constexpr auto kHealthyAfter = 10s;  // a component that ran this long starts over at 0.1 s
+constexpr auto kFailedTearDown = 500ms;
+
+/// Owns, to the end of the process, what a hung thread may still touch.
+void keep_for_ever(std::shared_ptr<void> thing) {
+  static auto* kept = new std::vector<std::shared_ptr<void>>();  // outlives static destruction
+  static std::mutex mutex;
+  const std::lock_guard lock(mutex);
+  kept->push_back(std::move(thing));
+}
+
+dds::ComponentSettings settings_of(const ComponentConfig& config) {
+  dds::ComponentSettings settings{config.name, config.parameters, {}};
+  for (const auto& [port, target] : config.remap) settings.remap[port] = target.topic;
+  return settings;
+}
+
+double to_seconds(std::chrono::nanoseconds time) {
+  return std::chrono::duration<double>(time).count();
+}
+
+}  // namespace
+
+ComponentSlot::ComponentSlot(std::uint64_t id,
+                             ComponentConfig config,
+                             ProbedComponent probed,
+                             Environment& environment)
+    : id_(id),
+      config_(std::move(config)),
+      probed_(std::move(probed)),
+      environment_(environment),
+      log_(environment.make_logger(config_.name)) {
+  failures_->policy = config_.on_error;
+  failures_->log = log_;
+}
+
+void ComponentSlot::construct() {
+  try {
+    try_construct();
+  } catch (...) {
+    failures_->add(std::current_exception());
+    failures_->pending = true;  // there is nothing that `ignore` could carry on with
+  }
+}
+
+void ComponentSlot::try_construct() {
+  if (executor_ == nullptr) {
+    executor_ = config_.executor.empty() ? ExecutorPool::make(config_.name)
+                                         : environment_.executors.shared(config_.executor);
+  }
+  factory_ = environment_.plugins->factory(config_.plugin);
+  context_ = std::make_unique<dds::ComponentContext>(
+      settings_of(config_),
+      environment_.middleware,
+      executor_,
+      log_,
+      [failures = failures_](const std::exception_ptr& error) { failures->add(error); });
+  {
+    const std::lock_guard lock(failures_->mutex);
+    failures_->tenant = context_->tenant();
+  }
+  component_ = factory_->create(*context_);
+}
+
+void ComponentSlot::launch() {
+  if (component_ == nullptr) return;
+  state_ = ComponentState::kRunning;
+  launched_at_ = Clock::now();
+  executor_->post(context_->tenant(), [component = component_.get(), context = context_.get()] {
+    component->start();
+    context->activate();  // after start(), so that no message comes before it
+  });
+}
+
+void ComponentSlot::Failures::add(const std::exception_ptr& error) {
+  const std::string text = describe(error);
+  ++count;
+  const std::lock_guard lock(mutex);
+  last = text;
+  if (policy == "ignore") {
+    log->warn("error ignored: {}", text);
+    return;
+  }
+  log->error("{} after an error: {}", policy == "stop" ? "stops" : "restarts", text);
+  if (const auto failed = tenant.lock()) failed->close();
+  pending = true;  // the rest is done in tick(), on another thread
+}
+
+void ComponentSlot::tick(Clock::time_point now) {
+  if (failures_->pending.exchange(false)) handle_failure(now);
+  if (state_ == ComponentState::kRestarting && now >= restart_at_) {
+    ++restarts_;
+    construct();
+    launch();
+  }
+  if (state_ == ComponentState::kRunning) watch(now);
+}
+
+void ComponentSlot::handle_failure(Clock::time_point now) {
+  const bool was_running = state_ == ComponentState::kRunning;
+  if (!end(now + kFailedTearDown)) return;
+  if (config_.on_error != "restart") {
+    state_ = ComponentState::kStopped;
+    return;
+  }
+  const bool first = back_off_ == 0ms || (was_running && now - launched_at_ > kHealthyAfter);
+  back_off_ = first ? kFirstBackOff : std::min(2 * back_off_, kLongestBackOff);
+  restart_at_ = now + back_off_;
+  state_ = ComponentState::kRestarting;
+}
+
+void ComponentSlot::watch(Clock::time_point) {
+  if (config_.watchdog_s <= 0.0) return;
+  const double busy_s = to_seconds(context_->tenant()->busy_time());
+  if (busy_s <= config_.watchdog_s) {
+    if (hang_reported_) log_->warn("the overdue callback has returned");
+    hang_reported_ = false;
+  } else if (!hang_reported_) {
+    hang_reported_ = true;
+    log_->error(
+        "a callback has been running for {:.1f} s (watchdog_s is {})", busy_s, config_.watchdog_s);
+  }
+}
+
+void ComponentSlot::close() {
+  if (context_ != nullptr) context_->tenant()->close();
+}
+
+bool ComponentSlot::end(Clock::time_point deadline) {
+  if (state_ == ComponentState::kHung) return false;
+  if (context_ != nullptr) {
+    const auto left =
+        std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now());
+    if (!context_->deactivate(std::max(left, 0ms))) {
+      abandon();
+      return false;
+    }
+  }
+  component_.reset();
+  context_.reset();
+  factory_.reset();
+  state_ = ComponentState::kStopped;
+  return true;
+}
+
+void ComponentSlot::abandon() {
+  state_ = ComponentState::kHung;
+  log_->error("hangs: a callback has been running for {:.1f} s and does not return",
+              to_seconds(context_->tenant()->busy_time()));
+  keep_for_ever(std::shared_ptr<Component>(std::move(component_)));
+  keep_for_ever(std::shared_ptr<dds::ComponentContext>(std::move(context_)));
+  keep_for_ever(executor_);
+  keep_for_ever(factory_);
+  keep_for_ever(environment_.plugins);
+}
+
+std::vector<Problem> ComponentSlot::change_parameters(const ParameterMap& changes) {
+  if (state_ != ComponentState::kRunning)
+    return {{{config_.name, 0}, "", "the component does not run"}};
+  auto problems = context_->change_parameters(changes);
+  if (!problems.empty()) return problems;
+  for (const auto& [key, parameter] : changes) {
+    config_.parameters[key] = parameter;  // a restart keeps it
+    probed_.effective_parameters[key] = parameter;
+  }
+  return {};
+}
+
+ComponentInfo ComponentSlot::info() const {
+  const std::lock_guard lock(failures_->mutex);
+  return {id_,
+          config_.name,
+          config_.plugin,
+          state_,
+          failures_->count,
+          restarts_,
+          failures_->last,
+          hang_reported_ || state_ == ComponentState::kHung};
+}
+
+Diagnostics::Status ComponentSlot::health() {
+  const ComponentInfo now = info();
+  Diagnostics::Status status;
+  if (context_ != nullptr) status = context_->diagnostics().status();
+  if (now.state == ComponentState::kHung) {
+    status.level = HealthLevel::kError;
+    status.message = "hangs: a callback does not return";
+  } else if (now.state == ComponentState::kStopped) {
+    status.level = HealthLevel::kError;
+    status.message = "stopped after an error: " + now.last_error;
+  } else if (now.state == ComponentState::kRestarting) {
+    status.level = HealthLevel::kError;
+    status.message = "waits for its restart after an error: " + now.last_error;
+  } else if (now.overdue) {
+    status.level = HealthLevel::kError;
+    status.message = fmt::format("a callback has been running for {:.1f} s",
+                                 to_seconds(context_->tenant()->busy_time()));
+  } else if (now.errors > reported_failures_ && status.level == HealthLevel::kOk) {
+    status.level = HealthLevel::kWarn;
+    status.message = "error: " + now.last_error;
+  }
+  reported_failures_ = now.errors;
+  status.values["errors"] = std::to_string(now.errors);
+  status.values["restarts"] = std::to_string(now.restarts);
+  if (context_ == nullptr) return status;
+  for (const auto& [topic, stats] : context_->subscription_stats()) {
+    status.values[topic + " received"] = std::to_string(stats.received);
+    status.values[topic + " lost"] = std::to_string(stats.lost);
+    status.values[topic + " rejected"] = std::to_string(stats.rejected);
+    status.values[topic + " starved"] = std::to_string(stats.starved);
+  }
+  return status;
+}
+
+}  // namespace camvox::bringup

@@ -1,0 +1,124 @@
+#include <chrono>
+
+#include "command_fixture.hpp"
+
+namespace camvox::bringup {
+namespace {
+
+using namespace std::chrono_literals;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using Clock = std::chrono::steady_clock;
+using CommandRun = CommandFixture;
+
+const std::string kTicker =
+    "container: {name: rig}\ncomponents:\n"
+    "  - {plugin: test::Ticker, name: ticker}\n";
+
+TEST_F(CommandRun, StopsCleanlyOnBothSignals) {
+  for (const int signal : {SIGINT, SIGTERM}) {
+    run(kTicker);
+    const auto begin = Clock::now();
+    EXPECT_EQ(stop(signal), 0) << container_->output();
+    EXPECT_LT(Clock::now() - begin, 2s);
+    EXPECT_THAT(container_->output(), HasSubstr("[rig]: stopped"));
+  }
+}
+
+TEST_F(CommandRun, PrintsTheEffectiveConfig) {
+  run(kTicker, {"--set", "ticker.hang_s=0.001"});
+  EXPECT_THAT(container_->output(), HasSubstr("hang_s: 0.001  # --set ticker.hang_s=0.001"));
+  EXPECT_THAT(container_->output(), HasSubstr("fail_at: 0  # default"));
+  EXPECT_EQ(stop(), 0);
+}
+
+TEST_F(CommandRun, HungComponentIsNamedAndDoesNotHoldUpTheExit) {
+  run("components:\n  - {plugin: test::Ticker, name: stuck, watchdog_s: 0.1,\n"
+      "     parameters: {hang_s: 60.0}}\n  - {plugin: test::Ticker, name: fine}\n");
+  ASSERT_TRUE(container_->wrote("[stuck]: a callback has been running")) << container_->output();
+  const auto begin = Clock::now();
+  EXPECT_EQ(stop(), 3);
+  EXPECT_LT(Clock::now() - begin, 2s);
+  EXPECT_THAT(container_->output(), HasSubstr("[stuck]: hangs"));
+  EXPECT_THAT(container_->output(), HasSubstr("exits without stuck, which hangs"));
+}
+
+TEST_F(CommandRun, SecondSignalExitsAtOnce) {
+  run("components:\n  - {plugin: test::Ticker, name: stuck, watchdog_s: 0.1,\n"
+      "     parameters: {hang_s: 60.0}}\n");
+  ASSERT_TRUE(container_->wrote("[stuck]: a callback has been running")) << container_->output();
+  kill(container_->pid(), SIGINT);
+  ASSERT_TRUE(container_->wrote("stops"));
+  EXPECT_EQ(stop(), 130) << container_->output();
+}
+
+TEST_F(CommandRun, ExitCodeTellsThatAComponentHasFailed) {
+  run("components:\n  - {plugin: test::Ticker, name: bad, parameters: {fail_at: 1}}\n");
+  ASSERT_TRUE(container_->wrote("stops after an error: tick failed"));
+  EXPECT_EQ(stop(), 3);
+}
+
+TEST_F(CommandRun, ListsAllProblemsAndStartsNothing) {
+  const auto result = command({"run",
+                               write("bad.yaml",
+                                     "components:\n"
+                                     "  - {plugin: test::PoseSink, name: a}\n"
+                                     "  - {plugin: test::Nope, name: a}\n")});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.output, HasSubstr("bad.yaml:3: a.name: is the name of another component"));
+  EXPECT_THAT(result.output, HasSubstr("bad.yaml:3: a.plugin: no installed package offers"));
+  EXPECT_THAT(result.output, HasSubstr("camvox: 2 problems in the config; nothing was started"));
+  EXPECT_THAT(result.output, Not(HasSubstr("components on domain")));
+}
+
+TEST_F(CommandRun, CheckAndPrintConfigStartNothing) {
+  const auto file = write("good.yaml", kTicker);
+  const auto check = command({"run", file, "--check"});
+  EXPECT_EQ(check.exit_code, 0);
+  EXPECT_EQ(check.output, file + ": valid, 1 components\n");
+  const auto print = command({"run", file, "--print-config"});
+  EXPECT_EQ(print.exit_code, 0);
+  EXPECT_THAT(print.output, ::testing::StartsWith("container:\n"));
+  EXPECT_THAT(print.output, Not(HasSubstr("components on domain")));
+}
+
+TEST_F(CommandRun, InstalledConfigsAreFoundByName) {
+  EXPECT_EQ(command({"run", "demo.yaml", "--check"}).exit_code, 0);
+}
+
+TEST_F(CommandRun, MissingConfigIsNamed) {
+  const auto result = command({"run", "/no/such/rig.yaml"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.output, HasSubstr("/no/such/rig.yaml: there is no such file"));
+}
+
+TEST_F(CommandRun, WrongCommandLinesAreRefused) {
+  for (const auto& arguments :
+       std::vector<std::vector<std::string>>{{},
+                                             {"fly"},
+                                             {"run"},
+                                             {"run", "a.yaml", "--chek"},
+                                             {"topic"},
+                                             {"topic", "hz"},
+                                             {"param", "get", "/x"},
+                                             {"component", "unload", "/x", "one"},
+                                             {"topic", "list", "--domain", "500"}}) {
+    const auto result = command(arguments);
+    EXPECT_EQ(result.exit_code, 2) << ::testing::PrintToString(arguments);
+    EXPECT_THAT(result.output, HasSubstr("camvox: "));
+    EXPECT_THAT(result.output, HasSubstr("--help"));
+  }
+}
+
+TEST_F(CommandRun, HelpNamesEveryWord) {
+  const auto result = command({"--help"});
+  EXPECT_EQ(result.exit_code, 0);
+  for (const auto* word : {"run", "component", "topic", "param", "version"}) {
+    EXPECT_THAT(result.output, HasSubstr(word));
+  }
+  EXPECT_THAT(command({"topic", "--help"}).output, HasSubstr("delay"));
+  EXPECT_EQ(command({"version"}).output, "camvox 0.1.0\n");
+}
+
+}  // namespace
+}  // namespace camvox::bringup

@@ -1,0 +1,76 @@
+// Components that differ only in what they ask for, for the checks before the start.
+#include <stdexcept>
+
+#include "camvox/component/component.hpp"
+#include "camvox/interfaces/camvox_interfaces.hpp"
+#include "camvox/interfaces/nav_msgs.hpp"
+#include "camvox/interfaces/sensor_msgs.hpp"
+
+namespace test {
+
+using camvox::Context;
+using camvox_interfaces::msg::Extrinsics;
+using camvox_interfaces::msg::FramePose;
+
+/// Internal output "pose".
+class PoseSource : public camvox::Component {
+ public:
+  explicit PoseSource(Context& context)
+      : publisher_(context.advertise<FramePose>({"pose", "/test/pose"})) {}
+
+ private:
+  camvox::Publisher<FramePose> publisher_;
+};
+
+struct SinkConfig {
+  double limit_m = 1.0;
+  int count = 3;
+  std::string mode = "fast";
+
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& field) {
+    field("limit_m", self.limit_m, camvox::config::greater_than(0.0));
+    field("ransac.count", self.count, camvox::config::at_least(1));
+    field("mode", self.mode, camvox::config::one_of({"fast", "slow"}));
+  }
+};
+
+/// Required internal input "pose", optional internal input "extrinsics", edge input "imu".
+class PoseSink : public camvox::Component {
+ public:
+  explicit PoseSink(Context& context) {
+    (void)context.parameters<SinkConfig>();
+    context.subscribe<FramePose>({"pose", "/test/pose"}, [](const auto&) {});
+    context.subscribe<Extrinsics>(
+        {"extrinsics", "/test/extrinsics"}, [](const auto&) {}, {.required = false});
+    context.subscribe<sensor_msgs::msg::Imu>({"imu", "/imu"}, [](const auto&) {});
+  }
+};
+
+/// Publishes an odometry where others expect a pose.
+class OdometrySource : public camvox::Component {
+ public:
+  explicit OdometrySource(Context& context)
+      : publisher_(context.advertise<nav_msgs::msg::Odometry>({"odometry", "/test/odometry"})) {}
+
+ private:
+  camvox::Publisher<nav_msgs::msg::Odometry> publisher_;
+};
+
+class ThrowingConstructor : public camvox::Component {
+ public:
+  explicit ThrowingConstructor(Context&) { throw std::runtime_error("the model file is missing"); }
+};
+
+class ThrowingInt : public camvox::Component {
+ public:
+  explicit ThrowingInt(Context&) { throw 42; }
+};
+
+}  // namespace test
+
+CAMVOX_REGISTER_COMPONENT(test::PoseSource)
+CAMVOX_REGISTER_COMPONENT(test::PoseSink)
+CAMVOX_REGISTER_COMPONENT(test::OdometrySource)
+CAMVOX_REGISTER_COMPONENT(test::ThrowingConstructor)
+CAMVOX_REGISTER_COMPONENT(test::ThrowingInt)

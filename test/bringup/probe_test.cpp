@@ -1,0 +1,171 @@
+#include "camvox/bringup/probe.hpp"
+
+#include <gmock/gmock.h>
+
+namespace camvox::bringup {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+const std::string kPoseSource = "  - {plugin: test::PoseSource, name: source}\n";
+const std::string kPoseSink = "  - {plugin: test::PoseSink, name: sink}\n";
+
+ProbedSystem probe(const std::string& text) {
+  PluginLoader plugins(find_plugins({PLUGIN_PREFIX}));
+  const auto [config, problems] = parse_config(text, "rig.yaml");
+  EXPECT_THAT(problems, IsEmpty());
+  return probe_system(config, plugins);
+}
+
+std::vector<std::string> problems_of(const std::string& components) {
+  std::vector<std::string> texts;
+  for (const auto& problem : probe("components:\n" + components).problems) {
+    texts.push_back(problem.to_string());
+  }
+  return texts;
+}
+
+TEST(Probe, CompleteSystemHasNoProblems) {
+  EXPECT_THAT(problems_of(kPoseSource + kPoseSink), IsEmpty());
+}
+
+TEST(Probe, RecordsPortsWithTypesAndTopics) {
+  const auto system = probe("components:\n" + kPoseSource +
+                            "  - {plugin: test::PoseSink, name: sink, remap: {imu: /livox/imu}}\n");
+  const auto& ports = system.components.at(1).ports;
+  ASSERT_EQ(ports.size(), 3U);
+  EXPECT_EQ(ports[0].type_name, "camvox_interfaces/msg/FramePose");
+  EXPECT_TRUE(ports[0].internal && ports[0].required && !ports[0].is_output);
+  EXPECT_FALSE(ports[1].required);
+  EXPECT_EQ(ports[2].topic, "/livox/imu");
+  EXPECT_FALSE(ports[2].internal);
+}
+
+TEST(Probe, ParameterProblemsNameFileLineAndKey) {
+  EXPECT_THAT(
+      problems_of(kPoseSource + R"(  - plugin: test::PoseSink
+    name: sink
+    parameters:
+      limit_m: -1.0
+      ransac: {count: 2.5, cuont: 1}
+      mode: medium
+)"),
+      ElementsAre("rig.yaml:6: sink.parameters.limit_m: -1.0 must be greater than 0",
+                  "rig.yaml:7: sink.parameters.ransac.count: expected integer, got double "
+                  "2.5",
+                  "rig.yaml:7: sink.parameters.ransac.cuont: unknown parameter (did you "
+                  "mean 'ransac.count'?)",
+                  "rig.yaml:8: sink.parameters.mode: \"medium\" must be one of fast, slow"));
+}
+
+TEST(Probe, ParametersOfAComponentWithoutAnyAreAnError) {
+  EXPECT_THAT(problems_of("  - {plugin: test::PoseSource, name: source, parameters: {x: 1}}\n"),
+              ElementsAre("rig.yaml:2: source.parameters.x: the component takes no parameters"));
+}
+
+TEST(Probe, UnknownPortNamesTheNearest) {
+  EXPECT_THAT(problems_of(kPoseSource + "  - plugin: test::PoseSink\n    name: sink\n    remap:\n"
+                                        "      extrinsic: /x\n      zzzzzzzzz: /y\n"),
+              ElementsAre("rig.yaml:6: sink.remap.extrinsic: unknown port (did you mean "
+                          "'extrinsics'?)",
+                          "rig.yaml:7: sink.remap.zzzzzzzzz: unknown port (there are pose, "
+                          "extrinsics, imu)"));
+}
+
+TEST(Probe, RequiredInternalInputNeedsAPublisher) {
+  EXPECT_THAT(problems_of(kPoseSink),
+              ElementsAre("rig.yaml:2: sink.remap.pose: nothing publishes /test/pose; add the "
+                          "component that does, remap the port, or list the topic in "
+                          "container.external_topics"));
+  EXPECT_THAT(problems_of("  - plugin: test::PoseSource\n    name: source\n"
+                          "    remap: {pose: /test/poses}\n" +
+                          kPoseSink),
+              ElementsAre(HasSubstr("did you mean '/test/poses'?")));
+}
+
+TEST(Probe, ExternalTopicNeedsNoPublisherHere) {
+  EXPECT_THAT(
+      probe("container: {external_topics: [/test/pose]}\ncomponents:\n" + kPoseSink).problems,
+      IsEmpty());
+  const auto both =
+      probe("container: {external_topics: [/test/pose]}\ncomponents:\n" + kPoseSource).problems;
+  ASSERT_EQ(both.size(), 1U);
+  EXPECT_THAT(both[0].message, HasSubstr("external_topics, but published here"));
+}
+
+TEST(Probe, TwoPublishersOfAnInternalTopicAreAnError) {
+  EXPECT_THAT(problems_of(kPoseSource + "  - {plugin: test::PoseSource, name: second}\n"),
+              ElementsAre("rig.yaml:3: second.remap.pose: /test/pose is published by 'source' "
+                          "already; an internal topic has one publisher"));
+}
+
+TEST(Probe, TwoPublishersOfAnEdgeTopicAreFine) {
+  EXPECT_THAT(problems_of("  - {plugin: test::OdometrySource, name: a}\n"
+                          "  - {plugin: test::OdometrySource, name: b}\n"),
+              IsEmpty());
+}
+
+TEST(Probe, OneTopicWithTwoTypesIsAnError) {
+  EXPECT_THAT(problems_of(kPoseSource + "  - plugin: test::OdometrySource\n    name: odometry\n" +
+                          "    remap: {odometry: /test/pose}\n"),
+              ElementsAre("rig.yaml:5: odometry.remap.odometry: /test/pose carries "
+                          "nav_msgs/msg/Odometry here, but camvox_interfaces/msg/FramePose in "
+                          "'source'"));
+}
+
+TEST(Probe, SettingsOfATopicThatNobodyUsesAreAnError) {
+  const auto system =
+      probe("topics:\n  /test/pos: {max_blocking_ms: 1}\ncomponents:\n" + kPoseSource);
+  ASSERT_EQ(system.problems.size(), 1U);
+  EXPECT_EQ(system.problems[0].to_string(),
+            "rig.yaml:2: topics./test/pos: no component uses this topic (did you mean "
+            "'/test/pose'?)");
+}
+
+TEST(Probe, ThrowingConstructorsAreReportedWhateverTheyThrow) {
+  EXPECT_THAT(problems_of("  - name: a\n    plugin: test::ThrowingConstructor\n"
+                          "  - name: b\n    plugin: test::ThrowingInt\n"),
+              ElementsAre("rig.yaml:3: a.plugin: constructor threw an exception: the model file is "
+                          "missing",
+                          "rig.yaml:5: b.plugin: constructor threw an exception: exception of a "
+                          "type that is not derived from std::exception"));
+}
+
+TEST(Probe, PluginsThatCannotBeLoadedAreListedTogether) {
+  const auto problems = problems_of(
+      "  - {plugin: test::MissingLibrary, name: a}\n"
+      "  - {plugin: test::Undefined, name: b}\n"
+      "  - {plugin: test::NoSuchThing, name: c}\n" +
+      kPoseSink);
+  ASSERT_EQ(problems.size(), 3U) << "what they would publish is not known, so not missing";
+  EXPECT_THAT(problems[0], HasSubstr("rig.yaml:2: a.plugin: plugin library"));
+  EXPECT_THAT(problems[1], HasSubstr("rig.yaml:3: b.plugin: "));
+  EXPECT_THAT(problems[1], HasSubstr("undefined symbol"));
+  EXPECT_THAT(problems[2], HasSubstr("rig.yaml:4: c.plugin: no installed package offers"));
+}
+
+TEST(EffectiveConfig, ShowsDefaultsAndOriginsAndReadsBack) {
+  const std::string text = "topics:\n  /test/pose: {max_blocking_ms: 7}\ncomponents:\n" +
+                           kPoseSource +
+                           "  - {plugin: test::PoseSink, name: sink, executor: two words,\n"
+                           "     parameters: {limit_m: 2.0}}\n";
+  PluginLoader plugins(find_plugins({PLUGIN_PREFIX}));
+  const auto config = parse_config(text, "rig.yaml").config;
+  const auto effective = effective_config(config, probe_system(config, plugins).components);
+  EXPECT_THAT(effective, HasSubstr("      limit_m: 2.0  # rig.yaml:6\n"));
+  EXPECT_THAT(effective, HasSubstr("      ransac.count: 3  # default\n"));
+  EXPECT_THAT(effective, HasSubstr("      imu: /imu  # in, sensor_msgs/msg/Imu\n"));
+  EXPECT_THAT(effective, HasSubstr("  watchdog_s: 5.0\n"));
+
+  const auto again = parse_config(effective, "effective.yaml");
+  EXPECT_THAT(again.problems, IsEmpty());
+  const auto probed = probe_system(again.config, plugins);
+  EXPECT_THAT(probed.problems, IsEmpty());
+  EXPECT_EQ(again.config.components.at(1).executor, "two words");
+  EXPECT_EQ(again.config.topics.at("/test/pose").max_blocking_ms, 7);
+}
+
+}  // namespace
+}  // namespace camvox::bringup
