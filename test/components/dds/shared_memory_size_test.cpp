@@ -55,7 +55,7 @@ TEST(SmallSharedMemory, IsEnoughWithoutSharedMemory) {
   EXPECT_EQ(child->wait(), 0) << child->output();
 }
 
-// Fast DDS itself would die of SIGBUS when it touches memory that is not there.
+// Fast DDS itself dies of SIGBUS when it touches memory that is not there.
 TEST(SmallSharedMemory, ForAnInterprocessTopicIsAnErrorToo) {
   auto child = child_with_shared_memory("100m", "shared", "write_images");
   const int result = child->wait();
