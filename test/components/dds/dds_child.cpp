@@ -4,8 +4,8 @@
 #include <unistd.h>
 
 #include <cstdio>
+#include <deque>
 #include <iostream>
-#include <optional>
 
 #include "camvox/interfaces/camvox_interfaces.hpp"
 #include "camvox/test/deadline.hpp"
@@ -84,17 +84,17 @@ void read(test::TestContainer& container) {
 /// Keeps the first cloud and looks at it whenever told to.
 void hold(test::TestContainer& container) {
   auto& context = container.component();
-  std::optional<Sample<Cloud>> held;
+  std::deque<Sample<Cloud>> held;
   const auto subscription =
       context.subscribe<Cloud>(kCloudPort, [&held](const Sample<Cloud>& cloud) {
-        if (held) return;
-        held = cloud;
+        if (!held.empty()) return;
+        held.push_back(cloud);
         say(fmt::format("holding {}", cloud->points()[0][0]));
       });
   container.activate();
   say_when_matched(subscription);
   while (next_order() == "look") {
-    context.post([&held] { say(fmt::format("seen {}", (*held)->points()[0][0])); });
+    context.post([&held] { say(fmt::format("seen {}", held.front()->points()[0][0])); });
   }
   container.remove(context);
 }

@@ -56,25 +56,25 @@ TEST(TearDown, WithSamplesHeldAndLoansOut) {
 TEST(TearDown, InEveryOrderOfReleases) {
   for (int order = 0; order < 4; ++order) {
     std::atomic<bool> got = false;
-    std::optional<Sample<Cloud>> held;
+    std::deque<Sample<Cloud>> held;
     std::optional<Loan<Cloud>> loan;
     auto container = std::make_unique<test::TestContainer>();
     auto& context = container->component();
     auto publisher = context.advertise<Cloud>(kPort);
     context.subscribe<Cloud>(kPort, [&](const Sample<Cloud>& cloud) {
-      if (!got) held = cloud;
+      if (!got) held.push_back(cloud);
       got = true;
     });
     container->activate();
     publisher.publish(publisher.loan());
     ASSERT_TRUE(wait_until([&] { return got.load(); }));
     loan = publisher.loan();
-    if ((order & 1) != 0) held.reset();
+    if ((order & 1) != 0) held.clear();
     if ((order & 2) != 0) container.reset();
     loan.reset();
     publisher = {};
     container.reset();
-    held.reset();
+    held.clear();
   }
 }
 
