@@ -196,6 +196,7 @@ Subscription ComponentContext::make_subscription(const Port& port,
       subscription->add_shared(middleware_.participant, topic, options);
     } else {
       border_handles_.push_back(gateway.add_consumer(topic, type, options.qos));
+      subscription->also_count(gateway.border_stats(topic));
     }
     subscription->attach(*executor_, tenant_, callback);
   });

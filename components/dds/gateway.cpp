@@ -105,12 +105,12 @@ class Gateway::Export : public std::enable_shared_from_this<Export> {
 /// Brings a topic of another process in, into in-place samples.
 class Gateway::Import {
  public:
-  Import(Gateway& gateway, const std::string& topic, const MessageType& type, const Qos& qos)
+  Import(Gateway& gateway, const std::string& topic, const Entry& entry)
       : executor_(gateway.executor_),
         log_(gateway.log_),
         topic_(topic),
         tenant_(make_tenant("import " + topic, log_)),
-        flow_(std::make_shared<Flow>(gateway, topic, type, qos)) {
+        flow_(std::make_shared<Flow>(gateway, topic, entry)) {
     executor_->add_source(
         tenant_, flow_->reader.data_condition(), [flow = flow_] { return flow->take_one(); });
   }
@@ -120,17 +120,14 @@ class Gateway::Import {
 
  private:
   struct Flow {
-    Flow(Gateway& gateway,
-         const std::string& topic,
-         const MessageType& message_type,
-         const Qos& qos)
-        : type(message_type),
-          rejected(gateway.rejected_),
-          publisher(gateway.participant_, topic, type, {.qos = qos, .max_loans = 1}, {}),
+    Flow(Gateway& gateway, const std::string& topic, const Entry& entry)
+        : type(*entry.type),
+          stats(entry.border_stats),
+          publisher(gateway.participant_, topic, type, {.qos = entry.qos, .max_loans = 1}, {}),
           reader(gateway.participant_,
                  wire_topic_name(topic),
                  new WireTopicType(type.dds_name),
-                 wire_reader_qos(qos)) {}
+                 wire_reader_qos(entry.qos)) {}
 
     bool take_one() {
       void* message = publisher.loan();
@@ -138,8 +135,10 @@ class Gateway::Import {
       eprosima::fastdds::dds::SampleInfo info;
       const auto code = reader->take_next_sample(&data, &info);
       const bool taken = code == ReturnCode::RETCODE_OK;
-      if (taken && info.valid_data && !data.well_formed) ++*rejected;
-      if (taken && info.valid_data && data.well_formed) {
+      const bool valid = taken && info.valid_data;
+      if (valid) stats->lost += tracker.track(info).lost_before;
+      if (valid && !data.well_formed) ++stats->rejected;
+      if (valid && data.well_formed) {
         publisher.publish_as_of(message, info.source_timestamp.to_ns());
       } else {
         publisher.discard(message);
@@ -148,7 +147,8 @@ class Gateway::Import {
     }
 
     const MessageType& type;
-    std::shared_ptr<std::atomic<std::uint64_t>> rejected;
+    std::shared_ptr<AtomicStats> stats;
+    SequenceTracker tracker;
     PlainPublisher publisher;
     ReaderHandle reader;
   };
@@ -163,7 +163,6 @@ class Gateway::Import {
 Gateway::Gateway(std::shared_ptr<Participant> participant, std::shared_ptr<Logger> log)
     : participant_(std::move(participant)),
       log_(std::move(log)),
-      rejected_(std::make_shared<std::atomic<std::uint64_t>>(0)),
       executor_(std::make_shared<Executor>("gateway")) {
   executor_->start();
 }
@@ -197,6 +196,11 @@ std::shared_ptr<void> Gateway::add_shared_consumer(const std::string& topic,
 bool Gateway::is_produced(const std::string& topic) {
   const std::lock_guard lock(mutex_);
   return entries_[topic].producers > 0;
+}
+
+std::shared_ptr<const AtomicStats> Gateway::border_stats(const std::string& topic) {
+  const std::lock_guard lock(mutex_);
+  return entries_[topic].border_stats;
 }
 
 bool Gateway::may_produce(const std::string& topic) {
@@ -238,7 +242,7 @@ void Gateway::update(const std::string& topic) {
     entry.outgoing->open();
   }
   if (imported && !entry.incoming) {
-    entry.incoming = std::make_shared<Import>(*this, topic, *entry.type, entry.qos);
+    entry.incoming = std::make_shared<Import>(*this, topic, entry);
   }
 }
 

@@ -40,8 +40,8 @@ class Gateway : public std::enable_shared_from_this<Gateway> {
   /// False while this container reads the topic from another process' shared memory: Fast DDS
   /// cannot share memory inside a process and would stall the topic.
   [[nodiscard]] bool may_produce(const std::string& topic);
-  /// Messages from other processes that were malformed or over capacity.
-  [[nodiscard]] std::uint64_t rejected() const { return *rejected_; }
+  /// What was lost or rejected of a topic's messages before they became in-place samples.
+  [[nodiscard]] std::shared_ptr<const AtomicStats> border_stats(const std::string& topic);
 
  private:
   class Export;
@@ -52,6 +52,7 @@ class Gateway : public std::enable_shared_from_this<Gateway> {
     int producers = 0;
     int consumers = 0;
     int shared_consumers = 0;
+    std::shared_ptr<AtomicStats> border_stats = std::make_shared<AtomicStats>();
     std::shared_ptr<Export> outgoing;
     std::shared_ptr<Import> incoming;
   };
@@ -64,7 +65,6 @@ class Gateway : public std::enable_shared_from_this<Gateway> {
 
   std::shared_ptr<Participant> participant_;
   std::shared_ptr<Logger> log_;
-  std::shared_ptr<std::atomic<std::uint64_t>> rejected_;
   std::shared_ptr<Executor> executor_;
   std::mutex mutex_;
   std::map<std::string, Entry> entries_;

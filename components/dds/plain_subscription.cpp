@@ -93,6 +93,13 @@ void PlainSubscription::attach(Executor& executor,
   }
 }
 
+SubscriptionStats PlainSubscription::stats() const {
+  SubscriptionStats stats = stats_->snapshot();
+  stats.lost += border_stats_->lost;
+  stats.rejected += border_stats_->rejected;
+  return stats;
+}
+
 std::size_t PlainSubscription::publisher_count() const {
   return in_place_->reader().writer_count() + (shared_ ? shared_->reader().writer_count() : 0);
 }

@@ -46,17 +46,21 @@ class PlainSubscription final : public SubscriptionBackend {
                   const std::string& topic,
                   const SubscribeOptions& options);
 
+  /// Adds what was lost or rejected at this container's border to the stats.
+  void also_count(std::shared_ptr<const AtomicStats> border) { border_stats_ = std::move(border); }
+
   /// Starts delivery on the executor.
   void attach(Executor& executor,
               const std::shared_ptr<Tenant>& tenant,
               const Context::Callback& callback);
 
-  [[nodiscard]] SubscriptionStats stats() const override { return stats_->snapshot(); }
+  [[nodiscard]] SubscriptionStats stats() const override;
   [[nodiscard]] std::size_t publisher_count() const override;
 
  private:
   const MessageType& type_;
   std::shared_ptr<AtomicStats> stats_ = std::make_shared<AtomicStats>();
+  std::shared_ptr<const AtomicStats> border_stats_ = std::make_shared<AtomicStats>();
   std::shared_ptr<PlainSource> in_place_;
   std::shared_ptr<PlainSource> shared_;
 };

@@ -15,7 +15,7 @@ endif()
 option(CAMVOX_WERROR "Treat warnings as errors" OFF)
 option(CAMVOX_SANITIZE "Build with -fsanitize=address,undefined" OFF)
 
-add_compile_options(-Wall -Wextra -Wshadow -Wconversion -Wnon-virtual-dtor)
+add_compile_options(-Wall -Wextra -Wshadow -Wconversion $<$<COMPILE_LANGUAGE:CXX>:-Wnon-virtual-dtor>)
 if(CAMVOX_WERROR)
   add_compile_options(-Werror)
 endif()

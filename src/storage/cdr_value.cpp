@@ -118,8 +118,10 @@ class Decoder {
       if (!status_.ok()) break;
       members.push_back({field.name, value(field)});
     }
-    // A struct without members has one byte in ROS 2 (structure_needs_at_least_one_member).
-    if (definition.fields.empty() && position_ < cdr_.size()) (void)take(1, 1);
+    // A struct without members has one byte in ROS 2 (structure_needs_at_least_one_member). Only
+    // for a whole message may it be missing; inside, it keeps a forged count from costing nothing.
+    const bool is_whole_message = position_ == kHeadSize && position_ == cdr_.size();
+    if (definition.fields.empty() && !is_whole_message) (void)take(1, 1);
     return CdrValue{std::move(members)};
   }
 

@@ -173,9 +173,11 @@ TEST(CdrValue, ForgedCountsDoNotTakeMemory) {
   };
   const auto numbers = schema_of("p/msg/T", "float64[] x");
   EXPECT_EQ(decode_cdr(numbers, bytes(~0U).bytes()).status().code(), StatusCode::kTruncated);
-  // Elements of no size: nothing else than the limit ends this.
+  // Elements without fields have a byte each, so that the data end this too.
   const auto empty = schema_of("p/msg/T", "E[] x\n" + dependency("p/E", ""));
-  EXPECT_EQ(decode_cdr(empty, bytes(~0U).bytes()).status().code(), StatusCode::kLimit);
+  EXPECT_EQ(decode_cdr(empty, bytes(~0U).bytes()).status().code(), StatusCode::kTruncated);
+  EXPECT_TRUE(decode_cdr(schema_of("p/msg/E", ""), Cdr().bytes()).ok());
+  EXPECT_TRUE(decode_cdr(schema_of("p/msg/E", ""), Cdr().number('\0').bytes()).ok());
   const auto bounded = schema_of("p/msg/T", "uint8[<=3] x");
   EXPECT_EQ(decode_cdr(bounded, bytes(4).bytes()).status().code(), StatusCode::kCorrupt);
   EXPECT_EQ(decode_cdr(numbers, as_bytes(std::string_view("\0\3\0\0\0\0\0\0", 8))).status().code(),

@@ -77,6 +77,8 @@ class FakeContext final : public Context {
   std::size_t run_posted(std::chrono::milliseconds patience = {});
 
   [[nodiscard]] std::vector<LogEntry> log_entries() const;
+  /// What topics() lists; nothing unless set.
+  void set_topics(std::vector<TopicDescription> topics) { topics_ = std::move(topics); }
   /// What subscriber_count() tells of an output; 1 unless set.
   void set_subscriber_count(std::string_view port, std::size_t count);
 
@@ -91,6 +93,7 @@ class FakeContext final : public Context {
   [[nodiscard]] Logger& log() override;
   [[nodiscard]] Diagnostics& diagnostics() override { return diagnostics_; }
   [[nodiscard]] std::int64_t now_ns() const override { return now_ns_; }
+  [[nodiscard]] std::vector<TopicDescription> topics() const override { return topics_; }
   void every(std::chrono::nanoseconds period, std::function<void()> callback) override;
   void post(std::function<void()> callback) override;
 
@@ -149,6 +152,7 @@ class FakeContext final : public Context {
   ChangeHandler change_handler_;
   std::unique_ptr<CapturingLogger> log_;
   Diagnostics diagnostics_;
+  std::vector<TopicDescription> topics_;
   std::map<std::string, std::shared_ptr<FakePublisher>, std::less<>> outputs_;
   std::map<std::string, std::shared_ptr<FakeSubscription>, std::less<>> inputs_;
   std::deque<Timer> timers_;

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <mutex>
+#include <string>
+#include <vector>
+
+namespace camvox::recording {
+
+/// Holds frames back until the components that must see every one have finished the earlier ones.
+/// Frames are told apart by the capture stamp of their image, so that a frame which sync had to
+/// leave out does not stop the rest. Thread-safe.
+class LockstepGate {
+ public:
+  /// At most `frames_in_flight` images may be under way; more than one, because a scan after the
+  /// image completes its frame only when the next image is almost due.
+  LockstepGate(std::vector<std::string> components, std::size_t frames_in_flight);
+
+  /// True if the next image may be sent.
+  [[nodiscard]] bool may_send() const;
+  void sent(std::int64_t stamp_ns);
+  /// `component` has finished all frames up to the stamp. Components not waited for are ignored.
+  void done(const std::string& component, std::int64_t stamp_ns);
+
+ private:
+  mutable std::mutex mutex_;
+  std::map<std::string, std::int64_t> done_;
+  std::deque<std::int64_t> in_flight_;
+  std::size_t frames_in_flight_;
+};
+
+}  // namespace camvox::recording

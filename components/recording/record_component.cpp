@@ -1,0 +1,119 @@
+#include "record_component.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <stdexcept>
+
+namespace camvox {
+namespace {
+
+constexpr int kQueueDepth = 200;  // messages of one topic that wait for our thread
+
+storage::BagWriterOptions writer_options(const RecordConfig& config) {
+  storage::BagWriterOptions options;
+  if (config.compression == "lz4") options.mcap.compression = storage::Compression::kLz4;
+  if (config.compression == "zstd") options.mcap.compression = storage::Compression::kZstd;
+  options.max_file_size = static_cast<std::uint64_t>(config.max_bag_size_mb * 1e6);
+  options.max_file_duration_ns = static_cast<std::uint64_t>(config.max_bag_duration_s * 1e9);
+  return options;
+}
+
+bool contains(const std::vector<std::string>& list, const std::string& name) {
+  return std::find(list.begin(), list.end(), name) != list.end();
+}
+
+}  // namespace
+
+RecordComponent::RecordComponent(Context& context)
+    : context_(context), config_(context.parameters<RecordConfig>()) {}
+
+RecordComponent::~RecordComponent() {
+  subscriptions_.clear();
+  if (!recorder_) return;
+  const auto status = recorder_->close();
+  if (!status.ok()) context_.log().error("{}", status.message());
+}
+
+void RecordComponent::start() {
+  auto bag = storage::BagWriter::create(config_.output, writer_options(config_));
+  if (!bag.ok()) throw std::runtime_error(bag.status().message());
+  recorder_ = std::make_unique<recording::Recorder>(
+      std::move(*bag), static_cast<std::size_t>(config_.max_cache_mb) << 20);
+  const auto period = std::chrono::duration_cast<std::chrono::nanoseconds>(
+      std::chrono::duration<double>(config_.polling_interval_s));
+  context_.every(period, [this] { follow_topics(); });
+  context_.every(std::chrono::seconds(1), [this] { report(); });
+  follow_topics();
+}
+
+bool RecordComponent::wanted(const std::string& topic) const {
+  if (contains(config_.exclude, topic)) return false;
+  return config_.topics.empty() || contains(config_.topics, topic);
+}
+
+void RecordComponent::follow_topics() {
+  for (const auto& topic : context_.topics()) {
+    if (topic.publishers == 0 || subscriptions_.contains(topic.name) || !wanted(topic.name)) {
+      continue;
+    }
+    record(topic);
+  }
+}
+
+void RecordComponent::record(const TopicDescription& topic) {
+  const MessageType* type = interfaces::find_message_type(topic.type_name);
+  storage::BagTopic entry;
+  entry.name = topic.name;
+  entry.type = topic.type_name;
+  entry.offered_qos_profiles = interfaces::to_rosbag2_yaml(topic.offered);
+  if (type != nullptr) {
+    entry.schema = type->schema;
+    entry.type_description_hash = type->type_hash;
+  } else {
+    context_.log().warn(
+        "{}: the definition of {} is not known here; recorded without it, so most "
+        "readers cannot decode it",
+        topic.name,
+        topic.type_name);
+  }
+  const auto number = recorder_->add_topic(std::move(entry));
+  if (!number.ok()) {
+    context_.log().error("{}: {}", topic.name, number.status().message());
+    subscriptions_[topic.name] = nullptr;  // told once
+    return;
+  }
+  const SubscribeOptions options{
+      .qos = {kQueueDepth, topic.offered.reliable, topic.offered.latched}, .required = false};
+  subscriptions_[topic.name] = context_.subscribe_raw(
+      {topic.name, topic.name},
+      topic.type_name,
+      [this, topic_number = *number](const Sample<RawMessage>& sample) {
+        const auto bytes =
+            std::shared_ptr<const std::vector<std::uint8_t>>(sample.message(), &sample->cdr);
+        recorder_->write(topic_number, context_.now_ns(), sample.info().publish_stamp_ns, bytes);
+      },
+      options);
+  context_.log().info("recording {} ({})", topic.name, topic.type_name);
+}
+
+void RecordComponent::report() {
+  const auto state = recorder_->state();
+  std::uint64_t lost = state.dropped;
+  for (const auto& [topic, subscription] : subscriptions_) {
+    if (subscription) lost += subscription->stats().lost;
+  }
+  context_.diagnostics().set("messages", state.written);
+  context_.diagnostics().set("bytes", state.written_bytes);
+  context_.diagnostics().set("lost", lost);
+  if (!state.status.ok() && !error_reported_) {
+    error_reported_ = true;
+    context_.diagnostics().report(HealthLevel::kError, state.status.message());
+    context_.log().error("recording stopped: {}", state.status.message());
+  } else if (lost > 0 && state.status.ok()) {
+    context_.diagnostics().report(HealthLevel::kWarn, "messages were lost");
+  }
+}
+
+}  // namespace camvox
+
+CAMVOX_REGISTER_COMPONENT(camvox::RecordComponent)

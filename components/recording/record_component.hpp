@@ -1,0 +1,58 @@
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "camvox/component/component.hpp"
+#include "camvox/recording/recorder.hpp"
+
+namespace camvox {
+
+/// Parameters of RecordComponent.
+struct RecordConfig {
+  std::string output;                ///< Folder to make; must not exist yet.
+  std::vector<std::string> topics;   ///< Only these; empty: all that are published.
+  std::vector<std::string> exclude;  ///< Not these.
+  std::string compression = "none";  ///< none, lz4 or zstd.
+  double max_bag_size_mb = 0.0;      ///< Goes on in a new file at this size; 0: never.
+  double max_bag_duration_s = 0.0;   ///< Goes on in a new file after this time; 0: never.
+  int max_cache_mb = 256;            ///< Bound of what waits for the disk.
+  double polling_interval_s = 0.1;   ///< How often to look for new topics.
+
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& field) {
+    field("output", self.output, config::not_empty());
+    field("topics", self.topics);
+    field("exclude", self.exclude);
+    field("compression", self.compression, config::one_of({"none", "lz4", "zstd"}));
+    field("max_bag_size_mb", self.max_bag_size_mb, config::at_least(0.0));
+    field("max_bag_duration_s", self.max_bag_duration_s, config::at_least(0.0));
+    field("max_cache_mb", self.max_cache_mb, config::at_least(1));
+    field("polling_interval_s", self.polling_interval_s, config::at_least(0.01));
+  }
+};
+
+/// Records any topics to MCAP, as `ros2 bag record -s mcap` does. Internal topics are recorded as
+/// the ROS 2 messages that other processes see.
+class RecordComponent final : public Component {
+ public:
+  explicit RecordComponent(Context& context);
+  ~RecordComponent() override;
+  void start() override;
+
+ private:
+  void follow_topics();
+  void record(const TopicDescription& topic);
+  void report();
+  [[nodiscard]] bool wanted(const std::string& topic) const;
+
+  Context& context_;
+  RecordConfig config_;
+  std::map<std::string, Subscription> subscriptions_;
+  std::unique_ptr<recording::Recorder> recorder_;
+  bool error_reported_ = false;
+};
+
+}  // namespace camvox

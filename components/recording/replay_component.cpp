@@ -1,0 +1,145 @@
+#include "replay_component.hpp"
+
+#include <chrono>
+#include <cstring>
+#include <map>
+#include <stdexcept>
+
+#include "camvox/storage/qos_profile.hpp"
+
+namespace camvox {
+namespace {
+
+constexpr std::int64_t kSecond_ns = 1'000'000'000;
+
+std::string remapped(const std::string& topic, const std::vector<std::string>& rules) {
+  for (const auto& rule : rules) {
+    const auto separator = rule.find(":=");
+    if (separator == std::string::npos) {
+      throw std::runtime_error("remap '" + rule + "': must be from:=to");
+    }
+    if (rule.substr(0, separator) == topic) return rule.substr(separator + 2);
+  }
+  return topic;
+}
+
+/// What the recorded publishers offered, if they agree; else the default, as `ros2 bag play`.
+Qos recorded_qos(const std::string& yaml) {
+  const auto profiles = storage::parse_qos_profiles(yaml);
+  if (!profiles.ok() || profiles->empty()) return qos::kDefault;
+  Qos result = qos::kDefault;
+  using Profile = storage::QosProfile;
+  const auto& first = profiles->front();
+  for (const auto& profile : *profiles) {
+    if (profile.reliability != first.reliability || profile.durability != first.durability) {
+      return qos::kDefault;
+    }
+  }
+  result.reliable = first.reliability != Profile::Reliability::kBestEffort;
+  result.latched = first.durability == Profile::Durability::kTransientLocal;
+  return result;
+}
+
+/// Capture stamp of a message that starts with std_msgs/Header: sec and nanosec behind the
+/// encapsulation, little-endian as everything that is recorded here.
+std::int64_t header_stamp_ns(const std::vector<std::uint8_t>& cdr) {
+  std::int32_t sec = 0;
+  std::uint32_t nanosec = 0;
+  if (cdr.size() < 12) return 0;
+  std::memcpy(&sec, cdr.data() + 4, sizeof(sec));
+  std::memcpy(&nanosec, cdr.data() + 8, sizeof(nanosec));
+  return sec * kSecond_ns + nanosec;
+}
+
+}  // namespace
+
+ReplayComponent::ReplayComponent(Context& context)
+    : context_(context),
+      config_(context.parameters<ReplayConfig>()),
+      gate_(config_.lockstep ? config_.lockstep_components : std::vector<std::string>{},
+            static_cast<std::size_t>(config_.frames_in_flight)) {
+  if (config_.clock_hz > 0.0) {
+    clock_ = context.advertise<rosgraph_msgs::msg::Clock>({"clock", topics::kClock},
+                                                          {.qos = qos::kClock});
+  }
+  if (!config_.lockstep) return;
+  context.subscribe<camvox_interfaces::msg::Progress>(
+      {"progress", topics::kProgress},
+      [this](const Sample<camvox_interfaces::msg::Progress>& sample) {
+        const auto& name = sample->component_name();
+        gate_.done({name.data(), strnlen(name.data(), name.size())}, sample->header().stamp_ns());
+        if (player_) player_->poke();
+      },
+      {.qos = qos::kKeyframes, .required = !config_.lockstep_components.empty()});
+}
+
+ReplayComponent::~ReplayComponent() = default;
+
+void ReplayComponent::start() {
+  auto bag = storage::BagReader::open(config_.bag);
+  if (!bag.ok()) throw std::runtime_error(bag.status().message());
+  for (const auto& problem : (*bag)->problems()) context_.log().warn("{}", problem.status.message());
+  advertise_topics(**bag);
+  recording::PlayerOptions options;
+  options.rate = config_.rate;
+  options.as_fast_as_possible = config_.lockstep;
+  options.loop = config_.loop;
+  options.start_offset_s = config_.start_offset_s;
+  options.start_paused = config_.start_paused;
+  options.topics = config_.topics;
+  options.read_ahead_bytes = static_cast<std::size_t>(config_.read_ahead_mb) << 20;
+  player_ = std::make_unique<recording::Player>(
+      std::move(*bag),
+      options,
+      [this](recording::PlayedMessage&& message) { send(std::move(message)); },
+      [this](const recording::PlayedMessage& message) {
+        return !is_frame_[message.topic] || gate_.may_send();
+      });
+  if (config_.clock_hz > 0.0) {
+    context_.every(std::chrono::nanoseconds(static_cast<std::int64_t>(1e9 / config_.clock_hz)),
+                   [this] {
+                     auto clock = clock_.loan();
+                     const std::int64_t now_ns = player_->clock_ns();
+                     clock->clock().sec(static_cast<std::int32_t>(now_ns / kSecond_ns));
+                     clock->clock().nanosec(static_cast<std::uint32_t>(now_ns % kSecond_ns));
+                     clock_.publish(std::move(clock));
+                   });
+  }
+  context_.every(std::chrono::milliseconds(200), [this] { report(); });
+  player_->start();
+}
+
+void ReplayComponent::advertise_topics(const storage::BagReader& bag) {
+  for (const auto& topic : bag.topics()) {
+    const std::string name = remapped(topic.name, config_.remap);
+    const PublishOptions options{.qos = recorded_qos(topic.offered_qos_profiles), .max_loans = 2};
+    publishers_.push_back(context_.advertise_raw({topic.name, name}, topic.type, options));
+    is_frame_.push_back(config_.lockstep && topic.name == config_.lockstep_topic);
+  }
+}
+
+void ReplayComponent::send(recording::PlayedMessage&& message) {
+  if (is_frame_[message.topic]) gate_.sent(header_stamp_ns(message.cdr));
+  auto& publisher = publishers_[message.topic];
+  auto loan = publisher.loan();
+  loan->cdr = std::move(message.cdr);
+  publisher.publish(std::move(loan));
+}
+
+void ReplayComponent::report() {
+  const auto state = player_->state();
+  context_.diagnostics().set("sent", state.sent);
+  context_.diagnostics().set("rate", state.rate);
+  if (!state.finished || end_reported_) return;
+  end_reported_ = true;
+  if (state.status.ok()) {
+    context_.log().info("end of {}: {} messages sent", config_.bag, state.sent);
+  } else {
+    context_.diagnostics().report(HealthLevel::kError, state.status.message());
+    context_.log().error("{}", state.status.message());
+  }
+}
+
+}  // namespace camvox
+
+CAMVOX_REGISTER_COMPONENT(camvox::ReplayComponent)

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "camvox/component/component.hpp"
+#include "camvox/interfaces/camvox_interfaces.hpp"
+#include "camvox/interfaces/rosgraph_msgs.hpp"
+#include "camvox/recording/lockstep_gate.hpp"
+#include "camvox/recording/player.hpp"
+
+namespace camvox {
+
+/// Parameters of ReplayComponent.
+struct ReplayConfig {
+  std::string bag;                  ///< A bag's folder, or one MCAP file.
+  double rate = 1.0;                ///< Speed; 1 is that of the recording.
+  bool loop = false;                ///< Starts again at the end.
+  double start_offset_s = 0.0;      ///< Leaves out the first part.
+  bool start_paused = false;        ///< Waits for `param set <name> paused false`.
+  std::vector<std::string> topics;  ///< Only these; empty: all.
+  std::vector<std::string> remap;   ///< "from:=to" each, as `ros2 bag play --remap`.
+  double clock_hz = 0.0;            ///< Publishes /clock this often; 0: never.
+  int read_ahead_mb = 256;          ///< Bound of what is read ahead.
+  bool lockstep = false;            ///< As fast as all listed components keep up, nothing dropped.
+  std::string lockstep_topic = "/camera/image_raw";  ///< Its messages are the frames.
+  std::vector<std::string> lockstep_components;      ///< Who reports each frame done.
+  int frames_in_flight = 2;  ///< Frames sent before the first of them must be done.
+
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& field) {
+    field("bag", self.bag, config::not_empty());
+    field("rate", self.rate, config::greater_than(0.0));
+    field("loop", self.loop);
+    field("start_offset_s", self.start_offset_s, config::at_least(0.0));
+    field("start_paused", self.start_paused);
+    field("topics", self.topics);
+    field("remap", self.remap);
+    field("clock_hz", self.clock_hz, config::at_least(0.0), config::at_most(1000.0));
+    field("read_ahead_mb", self.read_ahead_mb, config::at_least(1));
+    field("lockstep", self.lockstep);
+    field("lockstep_topic", self.lockstep_topic);
+    field("lockstep_components", self.lockstep_components);
+    field("frames_in_flight", self.frames_in_flight, config::at_least(1));
+  }
+};
+
+/// Publishes a recording. Bytes go out as they were recorded, whatever their type; internal topics
+/// are decoded once, into loaned samples, by the container. With `lockstep` the next frame is sent
+/// when the named components have reported the earlier one on /camvox/progress.
+class ReplayComponent final : public Component {
+ public:
+  explicit ReplayComponent(Context& context);
+  ~ReplayComponent() override;
+  void start() override;
+
+ private:
+  void advertise_topics(const storage::BagReader& bag);
+  void send(recording::PlayedMessage&& message);
+  void report();
+
+  Context& context_;
+  ReplayConfig config_;
+  recording::LockstepGate gate_;
+  Publisher<rosgraph_msgs::msg::Clock> clock_;
+  std::vector<Publisher<RawMessage>> publishers_;  // by number of the bag's topic
+  std::vector<bool> is_frame_;                     // same
+  std::unique_ptr<recording::Player> player_;
+  bool end_reported_ = false;
+};
+
+}  // namespace camvox

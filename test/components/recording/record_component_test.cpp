@@ -1,0 +1,80 @@
+#include "record_component.hpp"
+
+#include <gmock/gmock.h>
+
+#include "bag_files.hpp"
+#include "camvox/component/fake_context.hpp"
+
+namespace camvox {
+namespace {
+
+using recording::kStart_ns;
+using recording::TemporaryFolder;
+
+TopicDescription topic(const std::string& name, const std::string& type) {
+  TopicDescription description;
+  description.name = name;
+  description.type_name = type;
+  description.publishers = 1;
+  return description;
+}
+
+RawMessage message(std::uint8_t content) { return {recording::stamped_cdr(kStart_ns, content)}; }
+
+TEST(RecordComponent, RecordsEveryTopicWithItsDefinition) {
+  const TemporaryFolder folder;
+  FakeContext fake;
+  fake.set_parameter("output", folder.file("out"));
+  fake.set_topics({topic("/imu", "sensor_msgs/msg/Imu"), topic("/other", "x_msgs/msg/Unknown")});
+  {
+    RecordComponent record(fake);
+    record.start();
+    fake.send("/imu", message(1));
+    fake.send("/other", message(2));
+    fake.set_topics({topic("/late", "std_msgs/msg/Header")});
+    fake.advance(std::chrono::milliseconds(100));
+    fake.send("/late", message(3));
+  }
+  const auto bag = recording::open_bag(folder.file("out"));
+  ASSERT_EQ(bag->topics().size(), 3U);
+  EXPECT_EQ(bag->topics()[0].type, "sensor_msgs/msg/Imu");
+  EXPECT_THAT(bag->topics()[0].schema, ::testing::HasSubstr("MSG: geometry_msgs/Vector3"));
+  EXPECT_THAT(bag->topics()[0].type_description_hash, ::testing::StartsWith("RIHS01_7d9a00ff"));
+  std::vector<int> contents;
+  auto cursor = bag->messages();
+  while (const auto* stored = cursor.next()) {
+    contents.push_back(static_cast<int>(stored->data.back()));
+  }
+  EXPECT_THAT(contents, ::testing::ElementsAre(1, 2, 3));
+  EXPECT_THAT(fake.log_entries().at(2).text, ::testing::HasSubstr("x_msgs/msg/Unknown"));
+}
+
+TEST(RecordComponent, LeavesOutWhatIsExcludedOrNotAskedFor) {
+  const TemporaryFolder folder;
+  FakeContext fake;
+  fake.set_parameter("output", folder.file("out"));
+  fake.set_parameter("topics", std::vector<std::string>{"/a", "/b"});
+  fake.set_parameter("exclude", std::vector<std::string>{"/b"});
+  fake.set_topics({topic("/a", "std_msgs/msg/Header"),
+                   topic("/b", "std_msgs/msg/Header"),
+                   topic("/c", "std_msgs/msg/Header")});
+  {
+    RecordComponent record(fake);
+    record.start();
+    fake.send("/a", message(1));
+    EXPECT_THROW(fake.send("/b", message(2)), std::logic_error);
+    EXPECT_THROW(fake.send("/c", message(3)), std::logic_error);
+  }
+  EXPECT_EQ(recording::open_bag(folder.file("out"))->message_count(), 1U);
+}
+
+TEST(RecordComponent, NeverOverwritesARecording) {
+  const TemporaryFolder folder;
+  FakeContext fake;
+  fake.set_parameter("output", folder.file(""));
+  RecordComponent record(fake);
+  EXPECT_THROW(record.start(), std::runtime_error);
+}
+
+}  // namespace
+}  // namespace camvox

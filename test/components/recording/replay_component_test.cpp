@@ -1,0 +1,110 @@
+#include "replay_component.hpp"
+
+#include <gmock/gmock.h>
+
+#include <chrono>
+#include <thread>
+
+#include "bag_files.hpp"
+#include "camvox/component/fake_context.hpp"
+
+namespace camvox {
+namespace {
+
+using camvox_interfaces::msg::Progress;
+using recording::kStart_ns;
+using recording::TemporaryFolder;
+using std::chrono::steady_clock;
+
+/// Lets the component's timers run until the condition holds; false at the deadline.
+template <typename Condition>
+bool run_until(FakeContext& fake, Condition&& condition) {
+  const auto deadline = steady_clock::now() + std::chrono::seconds(20);
+  while (!condition()) {
+    if (steady_clock::now() > deadline) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    fake.advance(std::chrono::milliseconds(200));
+  }
+  return true;
+}
+
+bool logged(const FakeContext& fake, const std::string& text) {
+  for (const auto& entry : fake.log_entries()) {
+    if (entry.text.find(text) != std::string::npos) return true;
+  }
+  return false;
+}
+
+bool sent(FakeContext& fake, const std::string& count) {
+  return run_until(fake, [&] { return fake.diagnostics().status().values["sent"] == count; });
+}
+
+TEST(ReplayComponent, PublishesTheRecordedBytesUnderTheirNewNames) {
+  const TemporaryFolder folder;
+  recording::write_bag(folder.file("bag"), {{"/a", 0.0, 7}, {"/a", 0.01, 8}});
+  FakeContext fake;
+  fake.set_parameter("bag", folder.file("bag"));
+  fake.set_parameter("rate", 100.0);
+  fake.set_parameter("remap", std::vector<std::string>{"/a:=/b"});
+  ReplayComponent replay(fake);
+  replay.start();
+  ASSERT_TRUE(run_until(fake, [&] { return logged(fake, "2 messages sent"); }));
+  const auto messages = fake.published<RawMessage>("/a");
+  ASSERT_EQ(messages.size(), 2U);
+  EXPECT_EQ(messages[0]->cdr, recording::stamped_cdr(kStart_ns, 7));
+}
+
+TEST(ReplayComponent, LockstepSendsTheNextFrameWhenTheLastIsDone) {
+  const TemporaryFolder folder;
+  recording::write_bag(
+      folder.file("bag"),
+      {{"/image", 0.0, 0}, {"/imu", 0.05, 1}, {"/image", 0.1, 2}, {"/imu", 0.15, 3}});
+  FakeContext fake;
+  fake.set_parameter("bag", folder.file("bag"));
+  fake.set_parameter("lockstep", true);
+  fake.set_parameter("lockstep_topic", std::string("/image"));
+  fake.set_parameter("lockstep_components", std::vector<std::string>{"tracking"});
+  fake.set_parameter("frames_in_flight", std::int64_t{1});
+  ReplayComponent replay(fake);
+  replay.start();
+  ASSERT_TRUE(sent(fake, "2"));
+  fake.send<Progress>("progress", [](Progress& progress) {
+    progress.header().stamp_ns() = kStart_ns;
+    std::strncpy(progress.component_name().data(), "tracking", progress.component_name().size());
+  });
+  ASSERT_TRUE(run_until(fake, [&] { return logged(fake, "4 messages sent"); }));
+}
+
+TEST(ReplayComponent, PublishesTheClockOfTheRecording) {
+  const TemporaryFolder folder;
+  recording::write_bag(folder.file("bag"), {{"/a", 0.0, 7}});
+  FakeContext fake;
+  fake.set_parameter("bag", folder.file("bag"));
+  fake.set_parameter("clock_hz", 10.0);
+  ReplayComponent replay(fake);
+  replay.start();
+  fake.advance(std::chrono::milliseconds(100));
+  const auto clocks = fake.published<rosgraph_msgs::msg::Clock>("clock");
+  ASSERT_EQ(clocks.size(), 1U);
+  EXPECT_GE(clocks[0]->clock().sec(), kStart_ns / recording::kSecond_ns);
+}
+
+TEST(ReplayComponent, MissingBagIsAClearError) {
+  FakeContext fake;
+  fake.set_parameter("bag", std::string("/no/such/bag"));
+  ReplayComponent replay(fake);
+  EXPECT_THAT([&] { replay.start(); },
+              ::testing::ThrowsMessage<std::runtime_error>(::testing::HasSubstr("/no/such/bag")));
+}
+
+TEST(ReplayComponent, BadParametersAreAllReported) {
+  FakeContext fake;
+  fake.set_parameter("rate", 0.0);
+  fake.set_parameter("frames_in_flight", std::int64_t{0});
+  EXPECT_THAT([&] { ReplayComponent replay(fake); },
+              ::testing::ThrowsMessage<config::ConfigError>(::testing::AllOf(
+                  ::testing::HasSubstr("rate"), ::testing::HasSubstr("frames_in_flight"))));
+}
+
+}  // namespace
+}  // namespace camvox
