@@ -4,7 +4,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "camvox/bringup/plugin_index.hpp"
+#include "camvox/bringup/probe.hpp"
 
 namespace camvox::bringup {
 namespace {
@@ -26,6 +26,28 @@ TEST(Readme, ComponentExampleIsTheFileThatIsCompiled) {
   EXPECT_TRUE(std::any_of(plugins.begin(), plugins.end(), [](const auto& plugin) {
     return plugin.class_name == "ThumbnailComponent";
   }));
+}
+
+std::vector<std::string> code_blocks(const std::string& text, const std::string& language) {
+  std::vector<std::string> blocks;
+  const std::string fence = "```" + language + "\n";
+  for (auto at = text.find(fence); at != std::string::npos; at = text.find(fence, at + 1)) {
+    const auto begin = at + fence.size();
+    blocks.push_back(text.substr(begin, text.find("```", begin) - begin));
+  }
+  return blocks;
+}
+
+TEST(Readme, ConfigsAreValid) {
+  const auto blocks = code_blocks(read(kWorkspace / "README.md"), "yaml");
+  EXPECT_GE(blocks.size(), 3U);
+  PluginLoader plugins;
+  for (const auto& block : blocks) {
+    auto [config, problems] = parse_config(block, "README.md");
+    const auto probed = probe_system(config, plugins);
+    problems.insert(problems.end(), probed.problems.begin(), probed.problems.end());
+    for (const auto& problem : problems) ADD_FAILURE() << problem.to_string();
+  }
 }
 
 std::string without_code(std::string text) {
