@@ -48,6 +48,23 @@ struct Pending {
   }
 };
 
+/// What looks at the world, slow to set up.
+struct Optics {
+  SurfaceShader shader;
+  RayScene scene;
+  CameraRenderer renderer;
+  LidarScanner scanner;
+
+  Optics(const SimulationOptions& options, const World& world, int threads)
+      : shader(world.seed, threads),
+        scene(world),
+        renderer(sensors::CameraModel(options.intrinsics), options.camera, world, shader),
+        scanner(options.lidar, static_cast<std::uint64_t>(options.seed), shader) {}
+  // The renderer and the scanner point to the shader.
+  Optics(const Optics&) = delete;
+  Optics& operator=(const Optics&) = delete;
+};
+
 }  // namespace
 
 struct Simulator::Implementation {
@@ -57,10 +74,7 @@ struct Simulator::Implementation {
   World world;
   Trajectory trajectory;
   double duration_s;
-  SurfaceShader shader;
-  RayScene scene;
-  CameraRenderer renderer;
-  LidarScanner scanner;
+  std::optional<Optics> optics;  ///< Only if a sensor looks at the world.
   ImuErrors imu_errors;
   std::array<std::int64_t, kSensors> next_index{};
   std::priority_queue<Pending, std::vector<Pending>, std::greater<>> pending;
@@ -73,11 +87,9 @@ struct Simulator::Implementation {
         trajectory(given ? *std::move(given) : make_motion(options, world)),
         duration_s(options.duration_s > 0.0 ? std::min(options.duration_s, trajectory.duration_s())
                                             : trajectory.duration_s()),
-        shader(world.seed, threads),
-        scene(world),
-        renderer(sensors::CameraModel(options.intrinsics), options.camera, world, shader),
-        scanner(options.lidar, seed(), shader),
-        imu_errors(options.imu, options.imu_rate_hz, seed()) {}
+        imu_errors(options.imu, options.imu_rate_hz, seed()) {
+    if (options.images || options.scans) optics.emplace(options, world, threads);
+  }
 
   [[nodiscard]] std::uint64_t seed() const { return static_cast<std::uint64_t>(options.seed); }
 
@@ -194,8 +206,8 @@ struct Simulator::Implementation {
     const std::int64_t time = image_time_ns(index);
     const double time_s = static_cast<double>(time) / kNanoseconds;
     const auto pose = [this](double t) { return trajectory.pose(t) * rig.T_body_camera; };
-    Rendering rendering =
-        renderer.render(scene, {static_cast<std::uint64_t>(index), seed(), time_s, pose}, threads);
+    Rendering rendering = optics->renderer.render(
+        optics->scene, {static_cast<std::uint64_t>(index), seed(), time_s, pose}, threads);
     return {stamp(time) - rig.camera_time_offset_ns,
             index,
             std::move(rendering.image),
@@ -207,8 +219,8 @@ struct Simulator::Implementation {
   [[nodiscard]] LidarScan scan(std::int64_t index) {
     const auto pose = [this](double t) { return trajectory.pose(t) * rig.T_body_lidar(); };
     const std::int64_t start = time_ns(kLidar, index);
-    LidarScan result =
-        scanner.scan(scene, {start, time_ns(kLidar, index + 1) - start, pose}, threads);
+    LidarScan result = optics->scanner.scan(
+        optics->scene, {start, time_ns(kLidar, index + 1) - start, pose}, threads);
     result.stamp_ns = stamp(start);
     return result;
   }

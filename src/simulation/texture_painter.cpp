@@ -312,7 +312,8 @@ std::vector<Texture> make_textures(std::uint64_t seed, int threads) {
     const auto kind = static_cast<TextureKind>(i);
     const bool coarse = kind == TextureKind::kPaint || kind == TextureKind::kBark ||
                         kind == TextureKind::kCloth || kind == TextureKind::kClouds ||
-                        kind == TextureKind::kBlotches || kind == TextureKind::kFoliage;
+                        kind == TextureKind::kBlotches || kind == TextureKind::kFoliage ||
+                        kind == TextureKind::kPlaster || kind == TextureKind::kConcrete;
     painted[static_cast<std::size_t>(i)] = make_texture(kind, coarse ? 512 : 1024, seed);
   });
   std::vector<Texture> textures;
