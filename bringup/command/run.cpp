@@ -47,12 +47,28 @@ struct CheckedConfig {
   ProbedSystem probed;
 };
 
+/// The environment wins over the file, and --set over both.
+ContainerConfig with_environment(const ContainerConfig& config, const RunOptions& options) {
+  const auto is_set = [&options](const std::string& key) {
+    return std::any_of(
+        options.overrides.begin(), options.overrides.end(), [&key](const auto& text) {
+          return text.starts_with("container." + key + "=");
+        });
+  };
+  ContainerConfig result = with_ros_environment(config);
+  if (is_set("domain_id")) result.domain_id = config.domain_id;
+  if (is_set("network")) result.network = config.network;
+  if (is_set("peers")) result.peers = config.peers;
+  return result;
+}
+
 CheckedConfig check_config(const RunOptions& options, PluginLoader& plugins) {
   auto [config, problems] = read_config_file(find_config(options.config), options.overrides);
   auto probed = probe_system(config, plugins);
   problems.insert(problems.end(), probed.problems.begin(), probed.problems.end());
   sort_problems(problems);
   if (!problems.empty()) refuse(problems);
+  config.container = with_environment(config.container, options);
   return {std::move(config), std::move(probed)};
 }
 

@@ -180,11 +180,15 @@ std::vector<Problem> ComponentSlot::change_parameters(const ParameterMap& change
 }
 
 ComponentInfo ComponentSlot::info() const {
+  auto state = state_;
+  if (state == ComponentState::kRunning && failures_->pending) {  // not yet seen to by tick()
+    state = config_.on_error == "restart" ? ComponentState::kRestarting : ComponentState::kStopped;
+  }
   const std::lock_guard lock(failures_->mutex);
   return {id_,
           config_.name,
           config_.plugin,
-          state_,
+          state,
           failures_->count,
           restarts_,
           failures_->last,

@@ -33,7 +33,7 @@ dds::ParticipantOptions participant_options(const ContainerConfig& config) {
   options.shared_memory_segment_bytes = static_cast<std::size_t>(config.shared_memory_segment_mb)
                                         << 20;
   options.peers = config.peers;
-  return dds::with_ros_environment(options);
+  return options;
 }
 
 dds::TopicSettingsMap topic_settings(const SystemConfig& config) {
@@ -50,6 +50,14 @@ std::string join(const std::vector<Problem>& problems) {
 }
 
 }  // namespace
+
+ContainerConfig with_ros_environment(ContainerConfig config) {
+  const auto options = dds::with_ros_environment(participant_options(config));
+  config.domain_id = options.domain_id;
+  config.network = options.network == dds::Network::kSubnet ? "subnet" : "localhost";
+  config.peers = options.peers;
+  return config;
+}
 
 struct Container::Implementation {
   Implementation(SystemConfig system,

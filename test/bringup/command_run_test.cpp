@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <chrono>
 
 #include "command_fixture.hpp"
@@ -29,6 +31,8 @@ TEST_F(CommandRun, PrintsTheEffectiveConfig) {
   run(kTicker, {"--set", "ticker.hang_s=0.001"});
   EXPECT_THAT(container_->output(), HasSubstr("hang_s: 0.001  # --set ticker.hang_s=0.001"));
   EXPECT_THAT(container_->output(), HasSubstr("fail_at: 0  # default"));
+  EXPECT_THAT(container_->output(), HasSubstr(fmt::format("domain_id: {}\n", test::own_domain())))
+      << "ROS_DOMAIN_ID wins over the file";
   EXPECT_EQ(stop(), 0);
 }
 
@@ -80,6 +84,12 @@ TEST_F(CommandRun, CheckAndPrintConfigStartNothing) {
   EXPECT_EQ(print.exit_code, 0);
   EXPECT_THAT(print.output, ::testing::StartsWith("container:\n"));
   EXPECT_THAT(print.output, Not(HasSubstr("components on domain")));
+}
+
+TEST_F(CommandRun, OverridesWinOverTheEnvironment) {
+  const auto file = write("domain.yaml", "container: {domain_id: 3}\ncomponents: []\n");
+  const auto print = command({"run", file, "--print-config", "--set", "container.domain_id=5"});
+  EXPECT_THAT(print.output, HasSubstr("domain_id: 5\n"));
 }
 
 TEST_F(CommandRun, InstalledConfigsAreFoundByName) {

@@ -52,7 +52,8 @@ TEST_F(CommandTopic, HzMeasuresTheRate) {
   ASSERT_TRUE(
       std::regex_search(result.output, rate, std::regex("average rate: ([0-9.]+)\n\tmin: ")))
       << result.output;
-  EXPECT_NEAR(std::stod(rate[1]), 50.0, 15.0);
+  EXPECT_GT(std::stod(rate[1]), 25.0) << "a busy machine may drop some";
+  EXPECT_LT(std::stod(rate[1]), 60.0);
 }
 
 TEST_F(CommandTopic, HzPrintsItsSummaryOnCtrlC) {

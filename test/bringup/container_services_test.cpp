@@ -130,7 +130,7 @@ TEST_F(ContainerServicesTest, ParametersAreListedReadAndSet) {
   const auto results = set("/ticker",
                            {parameter("hang_s", 0.002),
                             parameter("fault", std::string("worse")),
-                            parameter("fail", std::int64_t{1}),
+                            parameter("fail_att", std::int64_t{1}),
                             parameter("hang_s", std::string("x"))})
                            .results();
   ASSERT_EQ(results.size(), 4U);

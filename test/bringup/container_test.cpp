@@ -45,7 +45,8 @@ class DiagnosticsReader {
     return statuses_[name];
   }
   [[nodiscard]] std::string value(const std::string& name, const std::string& key) {
-    for (const auto& pair : status(name).values()) {
+    const auto current = status(name);
+    for (const auto& pair : current.values()) {
       if (pair.key() == key) return pair.value();
     }
     return {};

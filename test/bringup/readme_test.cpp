@@ -4,7 +4,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "camvox/bringup/plugin_index.hpp"
+#include "camvox/bringup/probe.hpp"
 
 namespace camvox::bringup {
 namespace {
@@ -28,9 +28,39 @@ TEST(Readme, ComponentExampleIsTheFileThatIsCompiled) {
   }));
 }
 
+std::vector<std::string> code_blocks(const std::string& text, const std::string& language) {
+  std::vector<std::string> blocks;
+  const std::string fence = "```" + language + "\n";
+  for (auto at = text.find(fence); at != std::string::npos; at = text.find(fence, at + 1)) {
+    const auto begin = at + fence.size();
+    blocks.push_back(text.substr(begin, text.find("```", begin) - begin));
+  }
+  return blocks;
+}
+
+TEST(Readme, ConfigsAreValid) {
+  const auto blocks = code_blocks(read(kWorkspace / "README.md"), "yaml");
+  EXPECT_GE(blocks.size(), 3U);
+  PluginLoader plugins;
+  for (const auto& block : blocks) {
+    auto [config, problems] = parse_config(block, "README.md");
+    const auto probed = probe_system(config, plugins);
+    problems.insert(problems.end(), probed.problems.begin(), probed.problems.end());
+    for (const auto& problem : problems) ADD_FAILURE() << problem.to_string();
+  }
+}
+
+std::string without_code(std::string text) {
+  for (auto begin = text.find("```"); begin != std::string::npos; begin = text.find("```")) {
+    const auto end = text.find("```", begin + 3);
+    text.erase(begin, end == std::string::npos ? end : end + 3 - begin);
+  }
+  return text;
+}
+
 /// Every relative link of the README leads to a file.
 TEST(Readme, LinksLeadSomewhere) {
-  const auto readme = read(kWorkspace / "README.md");
+  const auto readme = without_code(read(kWorkspace / "README.md"));
   int links = 0;
   for (auto at = readme.find("]("); at != std::string::npos; at = readme.find("](", at + 1)) {
     const auto target = readme.substr(at + 2, readme.find(')', at) - at - 2);

@@ -120,6 +120,10 @@ int ChildProcess::wait(std::chrono::milliseconds patience) {
         return true;
       },
       patience);
+  // What it wrote last may still be in the pipe; a grandchild may keep that open for longer.
+  if (result_ != kRunsOn) {
+    (void)wait_until([this] { return output_ended(); }, std::chrono::seconds(2));
+  }
   return result_;
 }
 

@@ -13,6 +13,11 @@
 
 namespace camvox::bringup {
 
+/// The config with ROS_DOMAIN_ID, ROS_LOCALHOST_ONLY, ROS_AUTOMATIC_DISCOVERY_RANGE and
+/// ROS_STATIC_PEERS applied where they are set. Throws std::runtime_error naming a variable with an
+/// impossible value.
+[[nodiscard]] ContainerConfig with_ros_environment(ContainerConfig config);
+
 enum class ComponentState {
   kRunning,
   kRestarting,  ///< Failed, and waits for its next start.
