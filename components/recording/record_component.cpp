@@ -1,4 +1,4 @@
-#include "record_component.hpp"
+#include "camvox/recording/record_component.hpp"
 
 #include <algorithm>
 #include <chrono>
@@ -15,7 +15,17 @@ storage::BagWriterOptions writer_options(const RecordConfig& config) {
   if (config.compression == "zstd") options.mcap.compression = storage::Compression::kZstd;
   options.max_file_size = static_cast<std::uint64_t>(config.max_bag_size_mb * 1e6);
   options.max_file_duration_ns = static_cast<std::uint64_t>(config.max_bag_duration_s * 1e9);
+  if (config.survive_power_cut) options.durability = storage::Durability::kPowerCut;
   return options;
+}
+
+std::regex parse_regex(const std::string& key, const std::string& text) {
+  try {
+    return std::regex(text);
+  } catch (const std::regex_error& error) {
+    throw config::ConfigError(
+        {{{}, key, "'" + text + "' is no regular expression: " + error.what()}});
+  }
 }
 
 bool contains(const std::vector<std::string>& list, const std::string& name) {
@@ -25,13 +35,19 @@ bool contains(const std::vector<std::string>& list, const std::string& name) {
 }  // namespace
 
 RecordComponent::RecordComponent(Context& context)
-    : context_(context), config_(context.parameters<RecordConfig>()) {}
+    : context_(context),
+      config_(context.parameters<RecordConfig>()),
+      regex_(parse_regex("regex", config_.regex)),
+      exclude_regex_(parse_regex("exclude_regex", config_.exclude_regex)) {}
 
 RecordComponent::~RecordComponent() {
-  subscriptions_.clear();
-  if (!recorder_) return;
-  const auto status = recorder_->close();
+  const auto status = finish();
   if (!status.ok()) context_.log().error("{}", status.message());
+}
+
+storage::Status RecordComponent::finish() {
+  if (!recorder_) return {};
+  return recorder_->close();
 }
 
 void RecordComponent::start() {
@@ -47,8 +63,17 @@ void RecordComponent::start() {
 }
 
 bool RecordComponent::wanted(const std::string& topic) const {
-  if (contains(config_.exclude, topic)) return false;
-  return config_.topics.empty() || contains(config_.topics, topic);
+  if (contains(config_.exclude, topic) || std::regex_match(topic, exclude_regex_)) return false;
+  if (config_.topics.empty() && config_.regex.empty()) return true;
+  return contains(config_.topics, topic) || std::regex_match(topic, regex_);
+}
+
+std::uint64_t RecordComponent::lost() const {
+  std::uint64_t lost = recorder_->state().dropped;
+  for (const auto& [topic, subscription] : subscriptions_) {
+    if (subscription) lost += subscription->stats().lost;
+  }
+  return lost;
 }
 
 void RecordComponent::follow_topics() {
@@ -98,22 +123,17 @@ void RecordComponent::record(const TopicDescription& topic) {
 
 void RecordComponent::report() {
   const auto state = recorder_->state();
-  std::uint64_t lost = state.dropped;
-  for (const auto& [topic, subscription] : subscriptions_) {
-    if (subscription) lost += subscription->stats().lost;
-  }
+  const std::uint64_t lost_messages = lost();
   context_.diagnostics().set("messages", state.written);
   context_.diagnostics().set("bytes", state.written_bytes);
-  context_.diagnostics().set("lost", lost);
+  context_.diagnostics().set("lost", lost_messages);
   if (!state.status.ok() && !error_reported_) {
     error_reported_ = true;
     context_.diagnostics().report(HealthLevel::kError, state.status.message());
     context_.log().error("recording stopped: {}", state.status.message());
-  } else if (lost > 0 && state.status.ok()) {
+  } else if (lost_messages > 0 && state.status.ok()) {
     context_.diagnostics().report(HealthLevel::kWarn, "messages were lost");
   }
 }
 
 }  // namespace camvox
-
-CAMVOX_REGISTER_COMPONENT(camvox::RecordComponent)

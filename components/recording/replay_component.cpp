@@ -1,4 +1,4 @@
-#include "replay_component.hpp"
+#include "camvox/recording/replay_component.hpp"
 
 #include <chrono>
 #include <cstring>
@@ -78,7 +78,8 @@ ReplayComponent::~ReplayComponent() = default;
 void ReplayComponent::start() {
   auto bag = storage::BagReader::open(config_.bag);
   if (!bag.ok()) throw std::runtime_error(bag.status().message());
-  for (const auto& problem : (*bag)->problems()) context_.log().warn("{}", problem.status.message());
+  for (const auto& problem : (*bag)->problems())
+    context_.log().warn("{}", problem.status.message());
   advertise_topics(**bag);
   recording::PlayerOptions options;
   options.rate = config_.rate;
@@ -141,5 +142,3 @@ void ReplayComponent::report() {
 }
 
 }  // namespace camvox
-
-CAMVOX_REGISTER_COMPONENT(camvox::ReplayComponent)

@@ -1,4 +1,4 @@
-#include "record_component.hpp"
+#include "camvox/recording/record_component.hpp"
 
 #include <gmock/gmock.h>
 

@@ -1,4 +1,4 @@
-#include "replay_component.hpp"
+#include "camvox/recording/replay_component.hpp"
 
 #include <gmock/gmock.h>
 

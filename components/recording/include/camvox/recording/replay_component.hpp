@@ -18,7 +18,7 @@ struct ReplayConfig {
   double rate = 1.0;                ///< Speed; 1 is that of the recording.
   bool loop = false;                ///< Starts again at the end.
   double start_offset_s = 0.0;      ///< Leaves out the first part.
-  bool start_paused = false;        ///< Waits for `param set <name> paused false`.
+  bool start_paused = false;        ///< Waits until somebody resumes it.
   std::vector<std::string> topics;  ///< Only these; empty: all.
   std::vector<std::string> remap;   ///< "from:=to" each, as `ros2 bag play --remap`.
   double clock_hz = 0.0;            ///< Publishes /clock this often; 0: never.
@@ -54,6 +54,8 @@ class ReplayComponent final : public Component {
   explicit ReplayComponent(Context& context);
   ~ReplayComponent() override;
   void start() override;
+  /// Pause, rate and progress; only after `start`.
+  [[nodiscard]] recording::Player& player() { return *player_; }
 
  private:
   void advertise_topics(const storage::BagReader& bag);

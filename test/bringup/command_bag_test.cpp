@@ -1,0 +1,113 @@
+#include <chrono>
+#include <regex>
+
+#include "command_fixture.hpp"
+
+namespace camvox::bringup {
+namespace {
+
+using namespace std::chrono_literals;
+using ::testing::HasSubstr;
+namespace fs = std::filesystem;
+
+const std::string kSource = R"(container: {name: rig}
+components:
+  - plugin: camvox::SyntheticSourceComponent
+    name: source
+    parameters: {rate_hz: 50.0, width_px: 160, height_px: 120}
+)";
+
+const std::string kSink = R"(container: {name: desk, external_topics: [/camvox/frame_image]}
+components:
+  - {plugin: camvox::SinkComponent, name: sink}
+)";
+
+class CommandBag : public CommandFixture {
+ protected:
+  CommandBag() {
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+  }
+  ~CommandBag() override { fs::remove_all(folder_); }
+  [[nodiscard]] std::string path(const std::string& name) const { return folder_ / name; }
+
+  /// Records the source's images until there are some in the file.
+  void record(const std::string& bag, const std::vector<std::string>& more = {}) {
+    run(kSource);
+    std::vector<std::string> arguments = {"bag", "record", "-o", bag, "/camvox/frame_image"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const auto recorder = begin(arguments);
+    ASSERT_TRUE(recorder->wrote("recording /camvox/frame_image")) << recorder->output();
+    const fs::path file = fs::path(bag) / (fs::path(bag).filename().string() + "_0.mcap");
+    ASSERT_TRUE(
+        test::wait_until([&] { return fs::exists(file) && fs::file_size(file) > 100'000; }));
+    kill(recorder->pid(), SIGINT);
+    EXPECT_EQ(recorder->wait(), 0) << recorder->output();
+    EXPECT_THAT(recorder->output(), HasSubstr(" 0 lost"));
+    EXPECT_EQ(stop(), 0) << container_->output();
+  }
+  [[nodiscard]] std::uint64_t message_count(const std::string& bag) const {
+    const auto info = command({"bag", "info", bag});
+    EXPECT_EQ(info.exit_code, 0) << info.output;
+    std::smatch count;
+    EXPECT_TRUE(std::regex_search(info.output, count, std::regex("Messages: +([0-9]+)\n")));
+    return std::stoull(count[1]);
+  }
+
+  fs::path folder_ = fs::path(::testing::TempDir()) / ("camvox_bag_" + std::to_string(getpid()));
+};
+
+TEST_F(CommandBag, RecordsInfoDoctorAndReplaysAnInternalTopic) {
+  record(path("drive"));
+  const auto info = command({"bag", "info", path("drive")});
+  EXPECT_THAT(info.output, HasSubstr("Files:             drive_0.mcap\n"));
+  EXPECT_THAT(info.output,
+              HasSubstr("Topic information: Topic: /camvox/frame_image | Type: "
+                        "camvox_interfaces/msg/FrameImage | Count: "));
+  EXPECT_TRUE(fs::exists(path("drive") + "/metadata.yaml"));
+  const auto doctor = command({"bag", "doctor", path("drive/drive_0.mcap")});
+  EXPECT_EQ(doctor.exit_code, 0) << doctor.output;
+
+  run(kSink);
+  const auto played = command({"bag", "play", path("drive"), "--delay", "1", "--clock", "100"});
+  EXPECT_EQ(played.exit_code, 0) << played.output;
+  EXPECT_THAT(played.output, HasSubstr(" messages sent"));
+  EXPECT_EQ(stop(), 0) << container_->output();
+  EXPECT_THAT(container_->output(), HasSubstr("received     "));
+}
+
+TEST_F(CommandBag, ConvertKeepsEveryMessage) {
+  record(path("drive"));
+  const auto converted = command({"bag", "convert", "-i", path("drive"), "-o", path("small")});
+  EXPECT_EQ(converted.exit_code, 0) << converted.output;
+  EXPECT_EQ(message_count(path("small")), message_count(path("drive")));
+  EXPECT_LT(fs::file_size(path("small/small_0.mcap")), fs::file_size(path("drive/drive_0.mcap")));
+}
+
+TEST_F(CommandBag, RecoverSavesWhatIsWholeAndSaysThatSomethingWasLost) {
+  record(path("drive"));
+  const auto file = path("drive/drive_0.mcap");
+  fs::resize_file(file, fs::file_size(file) * 2 / 3);
+  const auto recovered = command({"bag", "recover", file, "-o", path("saved.mcap")});
+  EXPECT_EQ(recovered.exit_code, 3) << recovered.output;
+  EXPECT_THAT(recovered.output, HasSubstr("something was lost"));
+  EXPECT_GT(message_count(path("saved.mcap")), 0U);
+  EXPECT_EQ(command({"bag", "recover", path("saved.mcap"), "-o", path("again.mcap")}).exit_code, 0);
+}
+
+TEST_F(CommandBag, SaysWhatIsWrong) {
+  const auto missing = command({"bag", "info", path("no_such_bag")});
+  EXPECT_EQ(missing.exit_code, 1);
+  EXPECT_THAT(missing.output, HasSubstr("no_such_bag"));
+  EXPECT_EQ(command({"bag", "play", path("no_such_bag")}).exit_code, 1);
+  EXPECT_EQ(command({"bag", "record"}).exit_code, 1);
+  EXPECT_EQ(command({"bag", "play", "x", "--rate", "-1"}).exit_code, 2);
+  const auto exists = command({"bag", "record", "-a", "-o", folder_});
+  EXPECT_EQ(exists.exit_code, 1) << exists.output;
+  write("junk.mcap", "this is not MCAP");
+  const auto junk = command({"bag", "doctor", write("junk.mcap", "this is not MCAP")});
+  EXPECT_EQ(junk.exit_code, 1);
+}
+
+}  // namespace
+}  // namespace camvox::bringup
