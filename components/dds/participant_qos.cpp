@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include <cstdlib>
+#include <random>
 #include <stdexcept>
 
 #include "camvox/dds/shared_memory.hpp"
@@ -20,6 +21,7 @@ using eprosima::fastrtps::rtps::Locator_t;
 constexpr std::uint32_t kShmMaxMessageBytes = 4 << 20;
 constexpr std::uint32_t kSocketBufferBytes = 4 << 20;
 constexpr std::size_t kShmPortBytes = std::size_t{2} << 20;  // ports, locks and other small files
+constexpr std::uint32_t kFirstOwnShmPort = 1U << 30;         // far above the ports of any domain
 constexpr int kLocalPeers = 32;  // processes on this machine that find each other without multicast
 
 /// RTPS 2.3, 9.6.1.1: metatraffic unicast port of the n-th participant of a domain.
@@ -66,6 +68,22 @@ void add_transports(eprosima::fastdds::dds::DomainParticipantQos& qos,
     shm->max_message_size(kShmMaxMessageBytes);
     qos.transport().user_transports.push_back(shm);
   }
+}
+
+/// Where user data are received. Fast DDS derives the shared-memory port from the participant's
+/// index, so a process that replaces a killed one gets the killed one's port; a peer that still has
+/// that mapped writes into the void, and a reliable topic between the two never recovers. Hence a
+/// port of our own.
+void add_user_locators(eprosima::fastdds::dds::DomainParticipantQos& qos,
+                       const ParticipantOptions& options) {
+  auto& locators = qos.wire_protocol().default_unicast_locator_list;
+  const bool local = options.network == Network::kLocalhost;
+  locators.push_back(udp_locator(local ? "127.0.0.1" : "0.0.0.0", 0));
+  Locator_t shm;
+  shm.kind = LOCATOR_KIND_SHM;
+  shm.address[0] = 'U';  // unicast
+  shm.port = kFirstOwnShmPort + std::random_device()() % kFirstOwnShmPort;
+  locators.push_back(shm);
 }
 
 void add_peers(eprosima::fastdds::dds::DomainParticipantQos& qos,
@@ -150,6 +168,8 @@ eprosima::fastdds::dds::DomainParticipantQos participant_qos(const ParticipantOp
   qos.wire_protocol().builtin.discovery_config.leaseDuration = {5, 0};
   qos.wire_protocol().builtin.discovery_config.leaseDuration_announcementperiod = {1, 0};
   add_transports(qos, options);
+  // Discovery over shared memory alone finds a participant by the ports of its index only.
+  if (options.udp && options.shared_memory) add_user_locators(qos, options);
   if (options.udp) add_peers(qos, options);
   return qos;
 }

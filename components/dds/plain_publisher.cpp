@@ -2,12 +2,31 @@
 
 #include <fmt/format.h>
 
+#include "camvox/dds/shared_memory.hpp"
 #include "topic_types.hpp"
 
 namespace camvox::dds {
 namespace {
 
 using ReturnCode = eprosima::fastrtps::types::ReturnCode_t;
+
+/// Shared memory is taken as it is first touched, and when there is none left the process dies of
+/// SIGBUS; so all that the topic may ever need must be there at the start.
+void require_shared_memory(const std::string& topic, const MessageType& type, int samples) {
+  const std::uint64_t needed = static_cast<std::uint64_t>(samples) * type.size;
+  const std::uint64_t free = free_shared_memory_bytes();
+  if (free >= needed) return;
+  throw std::runtime_error(fmt::format(
+      "topic {}: zero_copy: interprocess needs {} MiB of shared memory ({} samples of {}), "
+      "/dev/shm "
+      "has {} MiB free. Enlarge it (mount -o remount,size=..., docker run --shm-size=...) or leave "
+      "zero_copy out",
+      topic,
+      (needed >> 20) + 1,
+      samples,
+      type.ros_name,
+      free >> 20));
+}
 
 std::unique_ptr<WriterHandle> make_shared_writer(const std::shared_ptr<Participant>& participant,
                                                  const std::string& topic,
@@ -19,6 +38,7 @@ std::unique_ptr<WriterHandle> make_shared_writer(const std::shared_ptr<Participa
     throw std::runtime_error("topic " + topic +
                              ": a latched topic cannot be zero_copy: interprocess");
   }
+  require_shared_memory(topic, type, options.qos.depth + kSharedExtraSamples);
   return std::make_unique<WriterHandle>(participant,
                                         shared_topic_name(topic),
                                         make_plain_topic_type(type),

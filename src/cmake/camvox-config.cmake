@@ -1,3 +1,4 @@
 # find_package(camvox): imported targets camvox::<folder> and the build options shared by all packages.
 include(CMakeFindDependencyMacro)
+find_dependency(Eigen3 3.4)
 include("${CMAKE_CURRENT_LIST_DIR}/camvox_targets.cmake")

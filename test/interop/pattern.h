@@ -4,6 +4,8 @@
 #include <stdint.h>
 
 enum {
+  kPrimer = -1, /* sent until the reader says that it hears; Cyclone drops what a volatile reader */
+                /* gets before a writer's first heartbeat */
   kMessages = 5,
   kImuDoubles = 37,
   kPointBytes = 26, /* Livox' ROS 2 driver, PointCloud2 */
