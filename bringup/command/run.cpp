@@ -111,7 +111,8 @@ int run(const RunOptions& options) {
     return Exit::kDone;
   }
   if (options.check) {
-    fmt::print("{}: valid, {} components\n", options.config, checked.config.components.size());
+    const auto count = checked.config.components.size();
+    fmt::print("{}: valid, {} component{}\n", options.config, count, count == 1 ? "" : "s");
     return Exit::kDone;
   }
   fmt::print("# effective config\n{}", text);

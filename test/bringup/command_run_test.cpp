@@ -79,7 +79,7 @@ TEST_F(CommandRun, CheckAndPrintConfigStartNothing) {
   const auto file = write("good.yaml", kTicker);
   const auto check = command({"run", file, "--check"});
   EXPECT_EQ(check.exit_code, 0);
-  EXPECT_EQ(check.output, file + ": valid, 1 components\n");
+  EXPECT_EQ(check.output, file + ": valid, 1 component\n");
   const auto print = command({"run", file, "--print-config"});
   EXPECT_EQ(print.exit_code, 0);
   EXPECT_THAT(print.output, ::testing::StartsWith("container:\n"));
