@@ -128,7 +128,13 @@ void ComponentContext::post(std::function<void()> callback) {
 void ComponentContext::accept_parameters(config::ParameterMap effective,
                                          std::vector<config::Problem> problems) {
   if (!problems.empty()) throw config::ConfigError(std::move(problems));
+  const std::lock_guard lock(effective_mutex_);
   effective_ = std::move(effective);
+}
+
+config::ParameterMap ComponentContext::effective_parameters() const {
+  const std::lock_guard lock(effective_mutex_);
+  return effective_;
 }
 
 std::vector<config::Problem> ComponentContext::change_parameters(
@@ -142,8 +148,11 @@ std::vector<config::Problem> ComponentContext::change_parameters(
   auto problems = done->get_future();
   executor_->post(tenant_, [this, done, changes] {
     auto found = change_handler_(changes);
-    for (const auto& [key, parameter] : changes) {
-      if (found.empty()) effective_[key] = parameter;
+    {
+      const std::lock_guard lock(effective_mutex_);
+      for (const auto& [key, parameter] : changes) {
+        if (found.empty()) effective_[key] = parameter;
+      }
     }
     done->set_value(std::move(found));
   });

@@ -128,8 +128,21 @@ WriterHandle::~WriterHandle() {
 
 void WriterHandle::on_publication_matched(fdds::DataWriter*,
                                           const fdds::PublicationMatchedStatus& status) {
+  {
+    const std::lock_guard lock(matched_mutex_);
+    if (status.current_count_change > 0) {
+      matched_.insert(status.last_subscription_handle);
+    } else {
+      matched_.erase(status.last_subscription_handle);
+    }
+  }
   readers_ = static_cast<std::size_t>(std::max(0, status.current_count));
   if (on_match_change_) on_match_change_();
+}
+
+bool WriterHandle::matches(const eprosima::fastrtps::rtps::GUID_t& reader) const {
+  const std::lock_guard lock(matched_mutex_);
+  return matched_.contains(eprosima::fastrtps::rtps::InstanceHandle_t(reader));
 }
 
 ReaderHandle::ReaderHandle(std::shared_ptr<Participant> participant,

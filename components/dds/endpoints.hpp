@@ -14,6 +14,8 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <mutex>
+#include <set>
 #include <string>
 
 #include "camvox/component/context.hpp"
@@ -54,6 +56,7 @@ class WriterHandle : private eprosima::fastdds::dds::DataWriterListener {
 
   eprosima::fastdds::dds::DataWriter* operator->() const { return writer_; }
   [[nodiscard]] std::size_t reader_count() const { return readers_; }
+  [[nodiscard]] bool matches(const eprosima::fastrtps::rtps::GUID_t& reader) const;
 
  private:
   void on_publication_matched(
@@ -64,6 +67,8 @@ class WriterHandle : private eprosima::fastdds::dds::DataWriterListener {
   std::shared_ptr<eprosima::fastdds::dds::Topic> topic_;
   std::function<void()> on_match_change_;
   std::atomic<std::size_t> readers_ = 0;
+  mutable std::mutex matched_mutex_;
+  std::set<eprosima::fastrtps::rtps::InstanceHandle_t> matched_;
   std::string guid_;
   eprosima::fastdds::dds::DataWriter* writer_ = nullptr;
 };

@@ -138,7 +138,9 @@ void Executor::Implementation::drain_sources() {
     any = false;
     for (const auto& source : snapshot(sources)) {
       if (!source->tenant->open()) continue;
-      source->tenant->invoke([&] { any = source->take_one() || any; });
+      bool took = true;  // also if its callback throws: there may be more
+      source->tenant->invoke([&] { took = source->take_one(); });
+      any = any || (took && source->tenant->open());
     }
     run_tasks();
     run_timers();
@@ -225,6 +227,12 @@ void Executor::post(std::shared_ptr<Tenant> tenant, std::function<void()> callba
   const std::lock_guard lock(implementation_->mutex);
   implementation_->tasks.push_back({std::move(tenant), std::move(callback)});
   implementation_->wake_up.set_trigger_value(true);
+}
+
+std::function<void()> Executor::waker() const {
+  return [state = std::weak_ptr(implementation_)] {
+    if (const auto alive = state.lock()) alive->wake_up.set_trigger_value(true);
+  };
 }
 
 bool Executor::remove(const std::shared_ptr<Tenant>& tenant, std::chrono::milliseconds timeout) {

@@ -130,7 +130,13 @@ class Gateway::Import {
                  wire_reader_qos(entry.qos)) {}
 
     bool take_one() {
-      void* message = publisher.loan();
+      void* message = nullptr;
+      try {
+        message = publisher.loan();
+      } catch (const LoanError&) {
+        ++stats->starved;  // what waits stays where it is until the next look
+        return false;
+      }
       WireData data{&type, message};
       eprosima::fastdds::dds::SampleInfo info;
       const auto code = reader->take_next_sample(&data, &info);

@@ -13,16 +13,20 @@ using ReturnCode = eprosima::fastrtps::types::ReturnCode_t;
 
 /// A sample on loan from a reader; goes back when destroyed, on any thread.
 struct HeldSample {
-  explicit HeldSample(std::shared_ptr<ReaderHandle> owner) : reader(std::move(owner)) {}
+  HeldSample(std::shared_ptr<ReaderHandle> owner, std::shared_ptr<Starvation> state)
+      : reader(std::move(owner)), starvation(std::move(state)) {}
   HeldSample(const HeldSample&) = delete;
   HeldSample& operator=(const HeldSample&) = delete;
   ~HeldSample() {
-    if (data.length() > 0) (*reader)->return_loan(data, infos);
+    if (data.length() == 0) return;
+    (*reader)->return_loan(data, infos);
+    if (starvation->starved.exchange(false)) starvation->wake();
   }
   /// Taking by bytes keeps this independent of the message's type: a loan is only a pointer.
   [[nodiscard]] const void* message() const { return data.buffer()[0]; }
 
   std::shared_ptr<ReaderHandle> reader;
+  std::shared_ptr<Starvation> starvation;
   eprosima::fastdds::dds::LoanableSequence<std::uint8_t> data;
   eprosima::fastdds::dds::SampleInfoSeq infos;
 };
@@ -30,9 +34,14 @@ struct HeldSample {
 }  // namespace
 
 bool PlainSource::take_one(const Context::Callback& callback) {
-  auto held = std::make_shared<HeldSample>(reader_);
-  const auto code = (*reader_)->take(held->data, held->infos, 1);
-  if (code == ReturnCode::RETCODE_OUT_OF_RESOURCES) ++stats_->starved;
+  auto held = std::make_shared<HeldSample>(reader_, starvation_);
+  auto code = (*reader_)->take(held->data, held->infos, 1);
+  if (code == ReturnCode::RETCODE_OUT_OF_RESOURCES) {
+    ++stats_->starved;
+    starvation_->starved = true;
+    // A sample may have come back just before that was said: nobody would wake us.
+    code = (*reader_)->take(held->data, held->infos, 1);
+  }
   if (code != ReturnCode::RETCODE_OK) return false;
   const auto& info = held->infos[0];
   if (!info.valid_data) return true;  // the end of a writer, not a message
@@ -87,6 +96,7 @@ void PlainSubscription::attach(Executor& executor,
                                const Context::Callback& callback) {
   for (const auto& source : {in_place_, shared_}) {
     if (!source) continue;
+    source->set_waker(executor.waker());
     executor.add_source(tenant, source->reader().data_condition(), [source, callback] {
       return source->take_one(callback);
     });

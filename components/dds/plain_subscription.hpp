@@ -7,6 +7,13 @@
 
 namespace camvox::dds {
 
+/// Set while a reader has no room for the next sample because too many are held; who gives one back
+/// then wakes the executor.
+struct Starvation {
+  std::atomic<bool> starved = false;
+  std::function<void()> wake;
+};
+
 /// One reader of plain messages in place: of this container's pool, or of memory shared with
 /// another process.
 class PlainSource {
@@ -24,12 +31,15 @@ class PlainSource {
   /// foreign writer, over capacity) are counted and skipped.
   bool take_one(const Context::Callback& callback);
   [[nodiscard]] const ReaderHandle& reader() const { return *reader_; }
+  /// Called when delivery can go on after starvation; set before the first take.
+  void set_waker(std::function<void()> wake) { starvation_->wake = std::move(wake); }
 
  private:
   std::shared_ptr<ReaderHandle> reader_;
   const MessageType& type_;
   bool from_this_process_;
   std::shared_ptr<AtomicStats> stats_;
+  std::shared_ptr<Starvation> starvation_ = std::make_shared<Starvation>();
   SequenceTracker tracker_;
 };
 

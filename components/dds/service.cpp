@@ -72,8 +72,9 @@ struct ServiceServer::Implementation {
     SampleIdentity related = info.sample_identity;
     if (reader != GUID_t::unknown()) related.writer_guid(reader);
     // Discovery is not symmetric: we may hear a request before we see the reader of its reply.
-    wait_until(std::chrono::steady_clock::now() + kClientMatchTimeout,
-               [&] { return replies.reader_count() > 0; });
+    wait_until(std::chrono::steady_clock::now() + kClientMatchTimeout, [&] {
+      return reader == GUID_t::unknown() ? replies.reader_count() > 0 : replies.matches(reader);
+    });
     WriteParams parameters;
     parameters.related_sample_identity(related);
     WireData data{&response_type, response};

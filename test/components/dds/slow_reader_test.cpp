@@ -126,6 +126,40 @@ TEST(SlowReader, HoldingTooMuchStopsDeliveryUntilItLetsGo) {
       << subscription->stats().received << ", starved " << subscription->stats().starved;
 }
 
+TEST(SlowReader, ThatLetsGoGetsTheNextSampleAtOnce) {
+  constexpr int kRounds = 50;  // a look once a second would take longer than wait_until waits
+  std::mutex mutex;
+  std::vector<Sample<Cloud>> kept;
+  test::TestContainer container;
+  auto publisher = container.component("writer").advertise<Cloud>(kPort, {.qos = qos::kFrames});
+  const auto subscription =
+      container.component("hoarder").subscribe<Cloud>(kPort,
+                                                      [&](const Sample<Cloud>& cloud) {
+                                                        const std::lock_guard lock(mutex);
+                                                        kept.push_back(cloud);
+                                                      },
+                                                      {.qos = qos::kFrames, .max_held = 2});
+  container.activate();
+  const auto start = std::chrono::steady_clock::now();
+  std::uint64_t sent = 0;
+  for (int round = 0; round < kRounds; ++round) {
+    const auto starved = subscription->stats().starved;
+    ASSERT_TRUE(wait_until([&] {
+      publish(publisher, ++sent);
+      return subscription->stats().starved > starved;
+    }));
+    const auto received = subscription->stats().received;
+    std::vector<Sample<Cloud>> released;
+    {
+      const std::lock_guard lock(mutex);
+      released.swap(kept);
+    }
+    released.clear();
+    ASSERT_TRUE(wait_until([&] { return subscription->stats().received > received; }));
+  }
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(30));
+}
+
 TEST(SlowReader, InAnotherProcessIsWaitedForNoLongerThanTheBound) {
   constexpr int kSent = 30;
   dds::TopicSettings settings;

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <vector>
 
@@ -68,7 +69,7 @@ class ComponentContext final : public Context {
   bool deactivate(std::chrono::milliseconds timeout);
 
   [[nodiscard]] const std::shared_ptr<Tenant>& tenant() const { return tenant_; }
-  [[nodiscard]] const config::ParameterMap& effective_parameters() const { return effective_; }
+  [[nodiscard]] config::ParameterMap effective_parameters() const;
   [[nodiscard]] bool parameters_can_change() const { return change_handler_ != nullptr; }
   /// Checks and applies changed parameters on the component's thread. Returns what is wrong; then
   /// nothing was changed.
@@ -120,6 +121,7 @@ class ComponentContext final : public Context {
   std::shared_ptr<Logger> log_;
   std::shared_ptr<Tenant> tenant_;
   Diagnostics diagnostics_;
+  mutable std::mutex effective_mutex_;  // changed on the component's thread, read on any
   config::ParameterMap effective_;
   ChangeHandler change_handler_;
   bool active_ = false;

@@ -63,6 +63,9 @@ class Executor {
              std::function<void()> callback);
   /// Runs something once on the thread; from any thread.
   void post(std::shared_ptr<Tenant> tenant, std::function<void()> callback);
+  /// Makes the thread look at all of its sources again; works from any thread, and does nothing
+  /// once the executor is gone.
+  [[nodiscard]] std::function<void()> waker() const;
   /// Drops the sources, timers and posted work of a tenant. On return nothing of it runs any more
   /// (unless called from one of its own callbacks). False: a callback of it did not end in time.
   bool remove(const std::shared_ptr<Tenant>& tenant, std::chrono::milliseconds timeout);
