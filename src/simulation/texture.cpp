@@ -11,6 +11,13 @@ std::uint8_t to_byte(float value) {
   return static_cast<std::uint8_t>(std::clamp(value, 0.0f, 1.0f) * 255.0f + 0.5f);
 }
 
+/// The part after the point, for numbers that fit an int. std::floor is a library call on
+/// processors without SSE 4.1, for which distributions build.
+float fraction(float value) {
+  const float part = value - static_cast<float>(static_cast<int>(value));
+  return part < 0.0f ? part + 1.0f : part;
+}
+
 /// Halves an image, each texel the mean of four.
 std::vector<Texel> reduce(const std::vector<Texel>& fine, std::size_t size) {
   const std::size_t half = size / 2;
@@ -68,8 +75,8 @@ float Texture::sample_grey(float u, float v, float footprint) const {
 
 Texture::Taps Texture::taps_at(int level, float u, float v) const {
   const int size = size_px_ >> level;
-  const float x = (u - std::floor(u)) * static_cast<float>(size) - 0.5f;
-  const float y = (v - std::floor(v)) * static_cast<float>(size) - 0.5f;
+  const float x = fraction(u) * static_cast<float>(size) - 0.5f;
+  const float y = fraction(v) * static_cast<float>(size) - 0.5f;
   // Truncation of a number above zero is its floor.
   const int column = static_cast<int>(x + 1.0f) - 1;
   const int row = static_cast<int>(y + 1.0f) - 1;

@@ -92,9 +92,8 @@ TEST(RayScene, MovingObjectsAreWhereTheyShouldBe) {
   }
 }
 
-TEST(RayScene, OcclusionOfParallelRaysEnds) {
-  // Regression: with Embree's coherent flag a packet of parallel rays never came back from
-  // rtcOccluded16 in the street world. Dense packets of sun rays from small patches.
+TEST(RayScene, OcclusionAgreesWithIntersection) {
+  // Dense packets of sun rays from small patches, as shadows need them.
   WorldConfig options;
   options.kind = "street";
   const World world = make_world(options);

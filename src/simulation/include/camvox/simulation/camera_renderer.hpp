@@ -51,7 +51,7 @@ struct Rendering {
   DepthImage depth;  ///< Of every pixel's centre, at its row's time; without blur.
 };
 
-/// Draws what the camera sees: one ray per pixel through the lens model, four more where surfaces
+/// Draws what the camera sees: one ray per pixel through the lens model, two more where surfaces
 /// meet (so that edges are as smooth as a lens makes them), sun with shadows, then blur by
 /// the camera's motion, gain, gamma and noise. The same input gives the same bytes with any
 /// number of threads.
