@@ -40,6 +40,7 @@ int main(int argc, char** argv) {
   camvox::command::add_component(app, common, action);
   camvox::command::add_topic(app, common, action);
   camvox::command::add_param(app, common, action);
+  camvox::command::add_import(app, action);
   camvox::command::add_version(app, action);
   try {
     app.parse(argc, argv);
