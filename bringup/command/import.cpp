@@ -6,6 +6,7 @@
 
 #include "camvox/import/kitti_raw.hpp"
 #include "camvox/import/livox_csv.hpp"
+#include "camvox/import/rosbag1.hpp"
 #include "camvox/import/seven_scenes.hpp"
 #include "command.hpp"
 #include "import_report_text.hpp"
@@ -127,6 +128,11 @@ void add_import(CLI::App& app, Action& action) {
   add_kitti_raw(*group, action);
   add_seven_scenes(*group, action);
   add_livox_csv(*group, action);
+  add<import::ImportOptions>(*group,
+                             "rosbag1",
+                             "A ROS 1 bag (format 2.0): the topics whose types camvox has",
+                             action,
+                             import::import_rosbag1);
 }
 
 }  // namespace camvox::command

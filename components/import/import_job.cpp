@@ -2,6 +2,8 @@
 
 #include <unistd.h>
 
+#include <algorithm>
+
 namespace camvox::import {
 
 namespace fs = std::filesystem;
@@ -40,7 +42,7 @@ void ImportJob::progress(std::uint64_t done, std::uint64_t total) {
 
 ImportReport ImportJob::finish() {
   report.topics = writer_->topics();
-  if (report.topics.empty()) {
+  if (std::ranges::all_of(report.topics, [](const auto& t) { return t.message_count == 0; })) {
     throw ImportError(StatusCode::kInvalid, "the input has nothing that can be imported");
   }
   require(writer_->close());
