@@ -1,13 +1,15 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
+#include <array>
 #include <chrono>
+#include <sstream>
 
 #include "camvox/import/kitti_raw.hpp"
 #include "camvox/import/livox_csv.hpp"
 #include "camvox/import/rosbag1.hpp"
 #include "camvox/import/seven_scenes.hpp"
+#include "camvox/import/tum_rgbd.hpp"
 #include "command.hpp"
 #include "import_report_text.hpp"
 #include "progress_bar.hpp"
@@ -92,6 +94,42 @@ void add_kitti_raw(CLI::App& group, Action& action) {
       ->check(CLI::Range(0, 3));
 }
 
+/// "517.3,516.5,318.6,255.3" with up to five numbers of distortion, or the name of a camera.
+std::array<double, 9> parse_intrinsics(const std::string& text) {
+  if (const auto known = import::tum_intrinsics(text)) return *known;
+  std::array<double, 9> values{};
+  std::size_t count = 0;
+  std::istringstream stream(text);
+  for (std::string word; std::getline(stream, word, ','); ++count) {
+    const bool good = count < values.size() && CLI::detail::lexical_cast(word, values[count]);
+    if (!good) count = values.size();  // and one more: refused below
+  }
+  if (count < 4 || count > values.size()) {
+    throw CLI::ValidationError("--intrinsics",
+                               "'" + text +
+                                   "' is neither fr1, fr2, fr3, icl nor "
+                                   "fx,fy,cx,cy[,k1,k2,p1,p2,k3]");
+  }
+  return values;
+}
+
+void add_tum_rgbd(CLI::App& group, Action& action) {
+  auto [command, options] = add<import::TumRgbdOptions>(
+      group,
+      "tum-rgbd",
+      "A sequence of the TUM RGB-D benchmark, or of ICL-NUIM in its form",
+      action,
+      import::import_tum_rgbd);
+  command->add_option_function<std::string>(
+      "--intrinsics",
+      [chosen = options](const std::string& text) { chosen->intrinsics = parse_intrinsics(text); },
+      "fr1, fr2, fr3, icl, or fx,fy,cx,cy[,k1,k2,p1,p2,k3] (default: by the folder's name)");
+  command->add_option(
+      "--depth-factor", options->depth_units_per_m, "Units a metre (default: 5000)");
+  command->add_option(
+      "--rate", options->index_rate_hz, "Frames a second of ICL-NUIM (default: 30)");
+}
+
 void add_seven_scenes(CLI::App& group, Action& action) {
   auto [command, options] = add<import::SevenScenesOptions>(
       group,
@@ -126,6 +164,7 @@ void add_import(CLI::App& app, Action& action) {
   auto* group = app.add_subcommand("import", "Make a bag (MCAP) of a public data set's recording");
   group->require_subcommand(1)->fallthrough();
   add_kitti_raw(*group, action);
+  add_tum_rgbd(*group, action);
   add_seven_scenes(*group, action);
   add_livox_csv(*group, action);
   add<import::ImportOptions>(*group,

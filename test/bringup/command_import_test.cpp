@@ -38,7 +38,10 @@ TEST_F(CommandImport, FailsOnBrokenInputAndWrongWords) {
   EXPECT_THAT(broken.output, HasSubstr("bad.csv:1: 'x' is not a number"));
   EXPECT_FALSE(fs::exists(bag_));
   EXPECT_EQ(command({"import", "kitti-raw", "/nowhere", "-o", bag_}).exit_code, 1);
+  EXPECT_EQ(command({"import", "rosbag1", write("x.bag", "no bag"), "-o", bag_}).exit_code, 1);
   EXPECT_EQ(command({"import"}).exit_code, 2);
+  EXPECT_EQ(command({"import", "tum-rgbd", "x", "--intrinsics", "525,525,319"}).exit_code, 2);
+  EXPECT_EQ(command({"import", "tum-rgbd", "/nowhere", "--intrinsics", "fr1"}).exit_code, 1);
   EXPECT_EQ(command({"import", "livox-csv"}).exit_code, 2);
   EXPECT_EQ(command({"import", "livox-csv", "x.csv", "--compression", "rar"}).exit_code, 2);
 }
