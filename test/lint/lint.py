@@ -17,12 +17,14 @@ UNFINISHED = re.compile(r"\b(TODO|FIXME|XXX)\b|not implemented")
 
 
 def tracked_files():
-    listed = subprocess.run(["git", "ls-files", "--cached", "--others", "--exclude-standard"], cwd=ROOT,
-                            capture_output=True, text=True, check=False)
-    names = listed.stdout.split("\n") if listed.returncode == 0 else [
-        str(p.relative_to(ROOT)) for top in ("src", "interfaces", "components", "bringup", "config", "test")
-        for p in (ROOT / top).rglob("*")]
-    return [ROOT / n for n in names if n and (ROOT / n).is_file()]
+    """What git knows of, or would add; without git, all that lies in the workspace's folders."""
+    if shutil.which("git"):
+        listed = subprocess.run(["git", "ls-files", "--cached", "--others", "--exclude-standard"], cwd=ROOT,
+                                capture_output=True, text=True, check=False)
+        if listed.returncode == 0:
+            return [ROOT / n for n in listed.stdout.split("\n") if n and (ROOT / n).is_file()]
+    tops = ("src", "interfaces", "components", "bringup", "config", "test")
+    return [p for top in tops for p in (ROOT / top).rglob("*") if p.is_file()]
 
 
 def line_rules(path):
