@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "camvox/component/raw_message.hpp"
 #include "fake_endpoints.hpp"
 
 namespace camvox {
@@ -240,7 +241,7 @@ std::shared_ptr<PublisherBackend> FakeContext::make_raw_publisher(const Port& po
   require_new(outputs_, "output", port.name);
   const std::string name(port.name);
   return outputs_[name] = std::make_shared<FakePublisher>(
-             name, fake_raw_type(type_name), true, options.max_loans);
+             name, raw_message_type(type_name), true, options.max_loans);
 }
 
 Subscription FakeContext::make_raw_subscription(const Port& port,
@@ -249,7 +250,7 @@ Subscription FakeContext::make_raw_subscription(const Port& port,
                                                 const SubscribeOptions& options) {
   require_new(inputs_, "input", port.name);
   return inputs_[std::string(port.name)] = std::make_shared<FakeSubscription>(
-             fake_raw_type(type_name), true, std::move(callback), options);
+             raw_message_type(type_name), true, std::move(callback), options);
 }
 
 }  // namespace camvox

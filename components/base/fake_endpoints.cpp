@@ -18,21 +18,6 @@ std::shared_ptr<void> make_unclean_message(const MessageType& type) {
   return message;
 }
 
-MessageType fake_raw_type(std::string_view ros_name) {
-  MessageType type;
-  type.ros_name = ros_name;
-  type.dds_name = interfaces::to_dds_type_name(ros_name);
-  type.size = sizeof(RawMessage);
-  type.create = []() -> void* { return new RawMessage; };
-  type.destroy = [](void* message) { delete static_cast<RawMessage*>(message); };
-  type.reset = [](void* message) { static_cast<RawMessage*>(message)->cdr.clear(); };
-  type.copy = [](const void* from, void* to) {
-    *static_cast<RawMessage*>(to) = *static_cast<const RawMessage*>(from);
-  };
-  type.counters_valid = [](const void*) { return true; };
-  return type;
-}
-
 FakePublisher::FakePublisher(std::string port, MessageType type, bool raw, int max_loans)
     : port_(std::move(port)),
       type_(std::move(type)),

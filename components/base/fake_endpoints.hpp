@@ -13,9 +13,6 @@ namespace camvox {
 /// A message as a component gets it: default values, but junk in the rows of a plain one's lists.
 [[nodiscard]] std::shared_ptr<void> make_unclean_message(const MessageType& type);
 
-/// The type of RawMessage under the ROS name of what is serialised in it.
-[[nodiscard]] MessageType fake_raw_type(std::string_view ros_name);
-
 /// Keeps what is published; lends out `max_loans` messages at a time. Thread-safe.
 class FakePublisher final : public PublisherBackend {
  public:

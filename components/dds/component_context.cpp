@@ -3,6 +3,7 @@
 #include <chrono>
 #include <future>
 
+#include "camvox/component/raw_message.hpp"
 #include "gateway.hpp"
 #include "plain_publisher.hpp"
 #include "plain_subscription.hpp"

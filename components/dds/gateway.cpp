@@ -107,9 +107,7 @@ class Gateway::Import {
  public:
   Import(Gateway& gateway, const std::string& topic, const Entry& entry)
       : executor_(gateway.executor_),
-        log_(gateway.log_),
-        topic_(topic),
-        tenant_(make_tenant("import " + topic, log_)),
+        tenant_(make_tenant("import " + topic, gateway.log_)),
         flow_(std::make_shared<Flow>(gateway, topic, entry)) {
     executor_->add_source(
         tenant_, flow_->reader.data_condition(), [flow = flow_] { return flow->take_one(); });
@@ -160,8 +158,6 @@ class Gateway::Import {
   };
 
   std::shared_ptr<Executor> executor_;
-  std::shared_ptr<Logger> log_;
-  std::string topic_;
   std::shared_ptr<Tenant> tenant_;
   std::shared_ptr<Flow> flow_;
 };

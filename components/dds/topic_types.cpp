@@ -1,9 +1,5 @@
 #include "topic_types.hpp"
 
-#include <cstring>
-
-#include "camvox/component/context.hpp"
-
 namespace camvox::dds {
 namespace {
 
@@ -48,34 +44,6 @@ std::function<std::uint32_t()> WireTopicType::getSerializedSizeProvider(void* da
     if (!wire.type->counters_valid(wire.message)) return std::uint32_t{0};
     return static_cast<std::uint32_t>(wire.type->cdr_size(wire.message));
   };
-}
-
-interfaces::MessageType raw_message_type(std::string_view ros_name) {
-  interfaces::MessageType type;
-  type.ros_name = ros_name;
-  type.dds_name = interfaces::to_dds_type_name(ros_name);
-  type.size = sizeof(RawMessage);
-  type.create = []() -> void* { return new RawMessage; };
-  type.destroy = [](void* message) { delete static_cast<RawMessage*>(message); };
-  type.reset = [](void* message) { static_cast<RawMessage*>(message)->cdr.clear(); };
-  type.copy = [](const void* from, void* to) {
-    *static_cast<RawMessage*>(to) = *static_cast<const RawMessage*>(from);
-  };
-  type.counters_valid = [](const void*) { return true; };
-  type.cdr_size = [](const void* message) {
-    return static_cast<const RawMessage*>(message)->cdr.size();
-  };
-  type.write_cdr = [](const void* message, std::uint8_t* data, std::size_t size) {
-    const auto& cdr = static_cast<const RawMessage*>(message)->cdr;
-    if (cdr.size() > size || cdr.size() < kEncapsulationBytes) return std::size_t{0};
-    std::memcpy(data, cdr.data(), cdr.size());
-    return cdr.size();
-  };
-  type.read_cdr = [](const std::uint8_t* data, std::size_t size, void* message) {
-    static_cast<RawMessage*>(message)->cdr.assign(data, data + size);
-    return size >= kEncapsulationBytes;
-  };
-  return type;
 }
 
 }  // namespace camvox::dds

@@ -62,7 +62,4 @@ class WireTopicType final : public TopicTypeBase {
   static constexpr std::size_t kFirstPayloadBytes = 1024;  // grows with what is really sent
 };
 
-/// The message type of serialised messages (camvox::RawMessage) under a ROS type name.
-[[nodiscard]] interfaces::MessageType raw_message_type(std::string_view ros_name);
-
 }  // namespace camvox::dds
