@@ -9,12 +9,13 @@ set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
 list(APPEND CMAKE_INSTALL_RPATH "$ORIGIN" "$ORIGIN/../lib")
 set(CMAKE_INSTALL_RPATH_USE_LINK_PATH ON)
 if(NOT CMAKE_BUILD_TYPE)
-  set(CMAKE_BUILD_TYPE RelWithDebInfo)
+  set(CMAKE_BUILD_TYPE Release)  # -O3: the per-pixel loops need its vectoriser
 endif()
 
 option(CAMVOX_WERROR "Treat warnings as errors" OFF)
 option(CAMVOX_SANITIZE "Build with -fsanitize=address,undefined" OFF)
 
+add_compile_options(-g1)  # line numbers in backtraces and profiles, at little cost
 add_compile_options(-Wall -Wextra -Wshadow -Wconversion $<$<COMPILE_LANGUAGE:CXX>:-Wnon-virtual-dtor>)
 if(CAMVOX_WERROR)
   add_compile_options(-Werror)
