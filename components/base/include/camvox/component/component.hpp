@@ -21,6 +21,10 @@ class Component {
 
   /// Called once on the component's thread when all components are wired; may open files.
   virtual void start() {}
+
+  /// Called once when the component ends, after its last callback: the place to save results and to
+  /// join own threads. May publish; posted work does not run any more. What it throws is logged.
+  virtual void stop() {}
 };
 
 /// Makes components of one class; what a plugin library exports.

@@ -171,6 +171,9 @@ class Context {
   /// Runs something once on the component's thread; safe to call from any thread.
   virtual void post(std::function<void()> callback) = 0;
 
+  /// Asks the container to end as after Ctrl-C, because the work is done (a recording has ended).
+  virtual void request_exit() {}
+
  protected:
   using ChangeHandler =
       std::function<std::vector<config::Problem>(const config::ParameterMap& changes)>;

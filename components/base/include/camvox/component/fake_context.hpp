@@ -96,6 +96,8 @@ class FakeContext final : public Context {
   [[nodiscard]] std::vector<TopicDescription> topics() const override { return topics_; }
   void every(std::chrono::nanoseconds period, std::function<void()> callback) override;
   void post(std::function<void()> callback) override;
+  void request_exit() override { exit_requested_ = true; }
+  [[nodiscard]] bool exit_requested() const { return exit_requested_; }
 
  protected:
   [[nodiscard]] const config::ParameterMap& given_parameters() const override { return given_; }
@@ -147,6 +149,7 @@ class FakeContext final : public Context {
 
   std::string name_;
   std::int64_t now_ns_;
+  bool exit_requested_ = false;
   config::ParameterMap given_;
   config::ParameterMap effective_;
   ChangeHandler change_handler_;
