@@ -1,0 +1,229 @@
+#include "camvox/optimization/pose_graph.hpp"
+
+#include <ceres/ceres.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <stdexcept>
+
+namespace camvox::optimization {
+namespace {
+
+using geometry::Matrix6d;
+using geometry::SE3;
+using geometry::Vector6d;
+
+/// A pose as Ceres holds it: [qx qy qz qw x y z].
+using Block = std::array<double, 7>;
+
+Block to_block(const SE3& T) {
+  const auto& q = T.rotation().quaternion();
+  const auto& t = T.translation();
+  return {q.x(), q.y(), q.z(), q.w(), t.x(), t.y(), t.z()};
+}
+
+SE3 to_se3(const double* block) {
+  return {geometry::SO3(Eigen::Quaterniond(block[3], block[0], block[1], block[2])),
+          Eigen::Vector3d(block[4], block[5], block[6])};
+}
+
+/// Our convention for Ceres: right perturbation, [rotation; translation]. Cost functions write
+/// their Jacobian over xi into the first six columns of the 7-column block and leave the last one
+/// zero, so that the plus Jacobian is [I; 0].
+class Se3Manifold final : public ceres::Manifold {
+ public:
+  int AmbientSize() const override { return 7; }
+  int TangentSize() const override { return 6; }
+
+  bool Plus(const double* x, const double* delta, double* x_plus_delta) const override {
+    const Eigen::Map<const Vector6d> xi(delta);
+    if (!xi.allFinite()) return false;
+    const Block moved = to_block(geometry::retract(to_se3(x), xi));
+    std::copy(moved.begin(), moved.end(), x_plus_delta);
+    return true;
+  }
+
+  bool PlusJacobian(const double* /*x*/, double* jacobian) const override {
+    Eigen::Map<Eigen::Matrix<double, 7, 6, Eigen::RowMajor>> J(jacobian);
+    J.setIdentity();
+    return true;
+  }
+
+  bool Minus(const double* y, const double* x, double* y_minus_x) const override {
+    Eigen::Map<Vector6d> xi(y_minus_x);
+    xi = geometry::local(to_se3(x), to_se3(y));
+    return true;
+  }
+
+  bool MinusJacobian(const double* /*x*/, double* jacobian) const override {
+    Eigen::Map<Eigen::Matrix<double, 6, 7, Eigen::RowMajor>> J(jacobian);
+    J.setIdentity();
+    return true;
+  }
+};
+
+class RelativePoseCost final : public ceres::SizedCostFunction<6, 7, 7> {
+ public:
+  explicit RelativePoseCost(const PoseGraphEdge& edge) : T_from_to_(edge.T_from_to) {
+    const Eigen::LLT<Matrix6d> cholesky(edge.covariance_to);
+    if (cholesky.info() != Eigen::Success || !edge.covariance_to.allFinite()) {
+      throw std::logic_error("pose graph: covariance of edge " + std::to_string(edge.from) +
+                             " -> " + std::to_string(edge.to) + " is not positive definite");
+    }
+    weight_ = cholesky.matrixL().solve(Matrix6d::Identity());
+  }
+
+  bool Evaluate(double const* const* poses, double* residuals, double** jacobians) const override {
+    using RowMajor = Eigen::Matrix<double, 6, 7, Eigen::RowMajor>;
+    const auto result = evaluate_relative_pose(to_se3(poses[0]), to_se3(poses[1]), T_from_to_);
+    Eigen::Map<Vector6d>(residuals, 6) = weight_ * result.r;
+    if (jacobians == nullptr) return true;
+    if (jacobians[0] != nullptr) {
+      Eigen::Map<RowMajor> J(jacobians[0]);
+      J.leftCols<6>() = weight_ * result.J_from;
+      J.col(6).setZero();
+    }
+    if (jacobians[1] != nullptr) {
+      Eigen::Map<RowMajor> J(jacobians[1]);
+      J.leftCols<6>() = weight_ * result.J_to;
+      J.col(6).setZero();
+    }
+    return true;
+  }
+
+ private:
+  SE3 T_from_to_;
+  Matrix6d weight_;  ///< weight_^T weight_ is the inverse covariance.
+};
+
+void check(const PoseGraph& graph) {
+  if (graph.fixed.size() != graph.T_map_node.size()) {
+    throw std::logic_error("pose graph: one `fixed` per node");
+  }
+  if (std::find(graph.fixed.begin(), graph.fixed.end(), true) == graph.fixed.end()) {
+    throw std::logic_error("pose graph: no node is fixed");
+  }
+  for (const auto& edge : graph.edges) {
+    if (edge.from >= graph.fixed.size() || edge.to >= graph.fixed.size() || edge.from == edge.to) {
+      throw std::logic_error("pose graph: edge between nodes that do not exist");
+    }
+  }
+}
+
+ceres::Solver::Options solver_options(const PoseGraphConfig& config) {
+  ceres::Solver::Options options;
+  options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
+  options.sparse_linear_algebra_library_type = ceres::SUITE_SPARSE;
+  options.max_num_iterations = config.max_iterations;
+  options.function_tolerance = config.relative_tolerance;
+  options.initial_trust_region_radius = 1e8;  // odometry is a good start: nearly Gauss-Newton
+  options.num_threads = 1;
+  options.logging_type = ceres::SILENT;
+  return options;
+}
+
+/// One pass over the edges that are still in.
+ceres::Solver::Summary solve_once(const PoseGraph& graph,
+                                  const PoseGraphConfig& config,
+                                  const std::vector<bool>& left_out,
+                                  std::vector<Block>& blocks) {
+  Se3Manifold manifold;
+  ceres::CauchyLoss kernel(config.kernel_width_sigma);
+  ceres::Problem::Options problem_options;
+  problem_options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  problem_options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  ceres::Problem problem(problem_options);
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    problem.AddParameterBlock(blocks[i].data(), 7, &manifold);
+    if (graph.fixed[i]) problem.SetParameterBlockConstant(blocks[i].data());
+  }
+  for (std::size_t i = 0; i < graph.edges.size(); ++i) {
+    if (left_out[i]) continue;
+    const auto& edge = graph.edges[i];
+    problem.AddResidualBlock(new RelativePoseCost(edge),
+                             edge.robust ? &kernel : nullptr,
+                             blocks[edge.from].data(),
+                             blocks[edge.to].data());
+  }
+  ceres::Solver::Summary summary;
+  ceres::Solve(solver_options(config), &problem, &summary);
+  return summary;
+}
+
+/// Squared distance of an edge from the poses, in sigma.
+double squared_distance(const PoseGraphEdge& edge, const std::vector<Block>& blocks) {
+  const auto result = evaluate_relative_pose(
+      to_se3(blocks[edge.from].data()), to_se3(blocks[edge.to].data()), edge.T_from_to);
+  return result.r.dot(edge.covariance_to.llt().solve(result.r));
+}
+
+}  // namespace
+
+std::string PoseGraphSummary::to_string() const {
+  std::array<char, 160> text{};
+  std::snprintf(
+      text.data(),
+      text.size(),
+      "pose graph: %zu poses, %zu edges, %zu left out, cost %.4g -> %.4g in %d iterations%s",
+      nodes,
+      edges,
+      outliers,
+      cost_before,
+      cost_after,
+      iterations,
+      usable ? "" : ", NOT usable");
+  return text.data();
+}
+
+RelativePoseResidual evaluate_relative_pose(const SE3& T_map_from,
+                                            const SE3& T_map_to,
+                                            const SE3& T_from_to) {
+  const SE3 T_to_from = T_map_to.inverse() * T_map_from;
+  RelativePoseResidual result;
+  result.r = (T_from_to.inverse() * T_to_from.inverse()).log();
+  result.J_to = SE3::right_jacobian_inverse(result.r);
+  result.J_from = -result.J_to * T_to_from.adjoint();
+  return result;
+}
+
+PoseGraphSolution solve(const PoseGraph& graph, const PoseGraphConfig& config) {
+  check(graph);
+  PoseGraphSolution solution;
+  solution.T_map_node = graph.T_map_node;
+  auto& summary = solution.summary;
+  summary.nodes = graph.T_map_node.size();
+  summary.edges = graph.edges.size();
+
+  std::vector<Block> blocks;
+  for (const auto& T : graph.T_map_node) blocks.push_back(to_block(T));
+  std::vector<bool> left_out(graph.edges.size(), false);
+  const auto first = solve_once(graph, config, left_out, blocks);
+  summary.iterations = static_cast<int>(first.iterations.size());
+  summary.cost_before = first.initial_cost;
+  summary.cost_after = first.final_cost;
+  summary.usable = first.IsSolutionUsable();
+  if (!summary.usable) return solution;
+
+  const double limit = config.outlier_sigma * config.outlier_sigma;
+  for (std::size_t i = 0; i < graph.edges.size(); ++i) {
+    if (!graph.edges[i].robust || !(squared_distance(graph.edges[i], blocks) > limit)) continue;
+    left_out[i] = true;
+    solution.outliers.push_back(i);
+  }
+  if (!solution.outliers.empty()) {
+    const auto second = solve_once(graph, config, left_out, blocks);
+    summary.iterations += static_cast<int>(second.iterations.size());
+    summary.cost_after = second.final_cost;
+    summary.usable = second.IsSolutionUsable();
+    if (!summary.usable) return solution;
+  }
+  summary.outliers = solution.outliers.size();
+  for (std::size_t i = 0; i < blocks.size(); ++i) solution.T_map_node[i] = to_se3(blocks[i].data());
+  return solution;
+}
+
+}  // namespace camvox::optimization
