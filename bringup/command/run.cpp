@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 
 #include "camvox/bringup/container.hpp"
 #include "command.hpp"
@@ -20,7 +21,11 @@ constexpr auto kStopPatience = 1800ms;  // for everything
 
 struct RunOptions {
   std::string config;
-  std::vector<std::string> overrides;
+  ConfigOverrides overrides;
+  std::string bag;  ///< Replayed, if not empty.
+  bool lockstep = false;
+  std::string output;  ///< Folder for results, if not empty.
+  bool overwrite = false;
   bool check = false;
   bool print_config = false;
 };
@@ -51,7 +56,7 @@ struct CheckedConfig {
 ContainerConfig with_environment(const ContainerConfig& config, const RunOptions& options) {
   const auto is_set = [&options](const std::string& key) {
     return std::any_of(
-        options.overrides.begin(), options.overrides.end(), [&key](const auto& text) {
+        options.overrides.values.begin(), options.overrides.values.end(), [&key](const auto& text) {
           return text.starts_with("container." + key + "=");
         });
   };
@@ -62,8 +67,44 @@ ContainerConfig with_environment(const ContainerConfig& config, const RunOptions
   return result;
 }
 
+config::Parameter from_command_line(config::Value value, const std::string& option) {
+  return {std::move(value), {option, 0}};
+}
+
+/// The component that replays `--bag`: the config's own, or one that is added.
+void replay_bag(const std::string& bag, SystemConfig& config) {
+  static constexpr auto kPlugin = "camvox::ReplayComponent";
+  auto replay = std::find_if(config.components.begin(),
+                             config.components.end(),
+                             [](const auto& component) { return component.plugin == kPlugin; });
+  if (replay == config.components.end()) {
+    ComponentConfig added;
+    added.plugin = kPlugin;
+    added.name = "replay";
+    added.location = added.plugin_location = {"--bag", 0};
+    added.watchdog_s = 0.0;
+    replay = config.components.insert(config.components.end(), std::move(added));
+  }
+  replay->parameters["bag"] = from_command_line(bag, "--bag");
+  replay->parameters.try_emplace("exit_at_end", from_command_line(true, "--bag"));
+}
+
+/// Carries the options over into what the config says.
+void apply_options(const RunOptions& options, SystemConfig& config) {
+  if (!options.bag.empty()) replay_bag(options.bag, config);
+  if (options.lockstep) {
+    config.shared_parameters["lockstep"] = from_command_line(true, "--lockstep");
+  }
+  if (!options.output.empty()) {
+    config.file_parameters.insert("output_dir");  // no error when no component saves anything
+    config.shared_parameters["output_dir"] =
+        from_command_line(std::filesystem::absolute(options.output).string(), "--out");
+  }
+}
+
 CheckedConfig check_config(const RunOptions& options, PluginLoader& plugins) {
   auto [config, problems] = read_config_file(find_config(options.config), options.overrides);
+  apply_options(options, config);
   auto probed = probe_system(config, plugins);
   problems.insert(problems.end(), probed.problems.begin(), probed.problems.end());
   sort_problems(problems);
@@ -83,16 +124,20 @@ int final_state(const std::vector<ComponentInfo>& components) {
 int run_container(CheckedConfig checked, std::shared_ptr<PluginLoader> plugins) {
   const auto loggers = console_loggers(parse_log_level(checked.config.container.log_level));
   const auto log = loggers(checked.config.container.name);
+  const auto save_timeout = std::chrono::milliseconds(
+      static_cast<std::int64_t>(1e3 * checked.config.container.save_timeout_s));
   auto container = std::make_unique<Container>(
       std::move(checked.config), std::move(checked.probed), std::move(plugins), loggers);
   ExitGuard guard(kStopPatience, [&container, log] {
     log->error("does not end: still {}; exits without it", container->current_activity());
   });
+  container->on_exit_request([&guard] { guard.request(); });
   container->start();
   guard.wait();
   log->info("stops");
   const int code = final_state(container->components());
-  const auto hung = container->stop(kStopTimeout);
+  const auto hung = container->stop(
+      kStopTimeout, [&guard, save_timeout] { guard.extend(kStopPatience + save_timeout); });
   if (!hung.empty()) {
     log->error(
         "exits without {}, which hang{}", fmt::join(hung, ", "), hung.size() == 1 ? "s" : "");
@@ -100,6 +145,22 @@ int run_container(CheckedConfig checked, std::shared_ptr<PluginLoader> plugins) 
   }
   log->info("stopped");
   return code;
+}
+
+/// Makes the folder of --out and puts the config there, so that results say how they came about.
+void prepare_output(const RunOptions& options, const std::string& effective) {
+  const std::filesystem::path folder = options.output;
+  std::error_code error;
+  const bool used = std::filesystem::exists(folder) && !std::filesystem::is_empty(folder, error);
+  if (used && !options.overwrite) {
+    throw CommandError(fmt::format(
+        "--out {}: is not empty; choose another folder, or add --overwrite", options.output));
+  }
+  std::filesystem::create_directories(folder, error);
+  std::ofstream file(folder / "config.yaml");
+  if (!(file << effective << std::flush)) {
+    throw CommandError(fmt::format("--out {}: cannot write there", options.output));
+  }
 }
 
 int run(const RunOptions& options) {
@@ -115,6 +176,7 @@ int run(const RunOptions& options) {
     fmt::print("{}: valid, {} component{}\n", options.config, count, count == 1 ? "" : "s");
     return Exit::kDone;
   }
+  if (!options.output.empty()) prepare_output(options, text);
   fmt::print("# effective config\n{}", text);
   std::fflush(stdout);
   return run_container(std::move(checked), plugins);
@@ -130,15 +192,28 @@ void add_run(CLI::App& app, Action& action) {
       ->required();
   command
       ->add_option("--set",
-                   options->overrides,
-                   "component.parameter=value or container.key=value, instead of the file's")
+                   options->overrides.values,
+                   "component.parameter=value, parameters.key=value (for all components) or "
+                   "container.key=value, instead of the file's")
       ->allow_extra_args(false);
+  command
+      ->add_option("--parameters",
+                   options->overrides.parameter_files,
+                   "File of parameters for all components, e.g. the rig.yaml of a recording")
+      ->allow_extra_args(false);
+  command->add_option("--bag", options->bag, "Recording to replay; the run ends with it");
+  command->add_flag("--lockstep",
+                    options->lockstep,
+                    "Replay as fast as possible, dropping nothing, the same bytes each time");
+  command->add_option("--out", options->output, "Folder for results");
+  command->add_flag("--overwrite", options->overwrite, "Let --out be a folder with files in it");
   command->add_flag("--check", options->check, "Only check the config");
   command->add_flag("--print-config",
                     options->print_config,
                     "Only check the config and print it with all defaults");
   command->footer(
-      "Exit code: 0 stopped by Ctrl-C or SIGTERM, 1 could not start, 2 wrong command line,\n"
+      "Exit code: 0 stopped by Ctrl-C, SIGTERM or the end of --bag, 1 could not start, 2 wrong "
+      "command line,\n"
       "3 a component had failed or hung, 130 killed by a second Ctrl-C.");
   command->callback([options, &action] { action = [options] { return run(*options); }; });
 }

@@ -6,6 +6,7 @@
 #include <sys/signalfd.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <csignal>
 #include <cstdlib>
 #include <system_error>
@@ -77,14 +78,18 @@ ExitGuard::~ExitGuard() {
   thread_.join();
 }
 
+void ExitGuard::extend(std::chrono::milliseconds patience) {
+  deadline_ = std::max(deadline_.load(), std::chrono::steady_clock::now() + patience);
+}
+
 void ExitGuard::wait() { wait_for(asked_.fd(), over_.fd(), {}); }
 
 void ExitGuard::watch() {
   signal_.wait();
   if (wait_for(over_.fd(), -1, std::chrono::milliseconds(0)) == 0) return;
   asked_.set();
-  const auto deadline = std::chrono::steady_clock::now() + patience_;
-  while (std::chrono::steady_clock::now() < deadline) {
+  extend(patience_);
+  while (std::chrono::steady_clock::now() < deadline_.load()) {
     if (signal_.wait(std::chrono::milliseconds(20))) {
       if (wait_for(over_.fd(), -1, std::chrono::milliseconds(0)) == 0) return;
       std::_Exit(Exit::kInterrupted);

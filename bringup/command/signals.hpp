@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <functional>
 #include <optional>
@@ -51,13 +52,18 @@ class ExitGuard {
   ExitGuard& operator=(const ExitGuard&) = delete;
   ~ExitGuard();
 
-  /// Waits for the first signal.
+  /// Waits for the first signal, or request().
   void wait();
+  /// Ends the wait although no signal came; from any thread.
+  void request() { asked_.set(); }
+  /// Gives more time, counted from now, to end in.
+  void extend(std::chrono::milliseconds patience);
 
  private:
   void watch();
 
   std::chrono::milliseconds patience_;
+  std::atomic<std::chrono::steady_clock::time_point> deadline_{};
   std::function<void()> on_overdue_;
   StopSignal signal_;
   Event asked_;

@@ -68,6 +68,7 @@ void ComponentSlot::try_construct() {
       executor_,
       log_,
       [failures = failures_](const std::exception_ptr& error) { failures->add(error); });
+  context_->on_exit_request(environment_.exit_request);
   {
     const std::lock_guard lock(failures_->mutex);
     failures_->tenant = context_->tenant();
@@ -79,10 +80,13 @@ void ComponentSlot::launch() {
   if (component_ == nullptr) return;
   state_ = ComponentState::kRunning;
   launched_at_ = Clock::now();
-  executor_->post(context_->tenant(), [component = component_.get(), context = context_.get()] {
-    component->start();
-    context->activate();  // after start(), so that no message comes before it
-  });
+  started_ = std::make_shared<std::atomic<bool>>(false);
+  executor_->post(context_->tenant(),
+                  [component = component_.get(), context = context_.get(), started = started_] {
+                    component->start();
+                    *started = true;
+                    context->activate();  // after start(), so that no message comes before it
+                  });
 }
 
 void ComponentSlot::Failures::add(const std::exception_ptr& error) {
@@ -139,21 +143,28 @@ void ComponentSlot::close() {
   if (context_ != nullptr) context_->tenant()->close();
 }
 
-bool ComponentSlot::end(Clock::time_point deadline) {
+bool ComponentSlot::halt(Clock::time_point deadline) {
   if (state_ == ComponentState::kHung) return false;
-  if (context_ != nullptr) {
-    const auto left =
-        std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now());
-    if (!context_->deactivate(std::max(left, 0ms))) {
-      abandon();
-      return false;
+  if (context_ == nullptr) return true;
+  const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now());
+  if (context_->deactivate(std::max(left, 0ms))) return true;
+  abandon();
+  return false;
+}
+
+void ComponentSlot::finish() {
+  if (component_ != nullptr && started_ != nullptr && *started_) {
+    try {
+      component_->stop();
+    } catch (...) {
+      log_->error("while stopping: {}", describe(std::current_exception()));
     }
   }
+  started_.reset();
   component_.reset();
   context_.reset();
   factory_.reset();
   state_ = ComponentState::kStopped;
-  return true;
 }
 
 void ComponentSlot::abandon() {

@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -21,6 +22,7 @@ struct Environment {
   LoggerFactory make_logger;
   dds::Middleware middleware;
   ExecutorPool executors;
+  std::function<void()> exit_request;  ///< What Context::request_exit of a component does.
 };
 
 /// One component from its construction to its end, with what happens when it fails. Not
@@ -40,9 +42,17 @@ class ComponentSlot {
   void launch();
   /// No callback begins any more; the first step of ending several components at once.
   void close();
-  /// Ends the component. False: a callback of it does not return; everything that it might still
-  /// touch is kept until the process ends.
-  bool end(Clock::time_point deadline);
+  /// Ends delivery. False: a callback of it does not return; everything that it might still touch
+  /// is kept until the process ends.
+  bool halt(Clock::time_point deadline);
+  /// After halt: lets the component save its results, and takes it down.
+  void finish();
+  /// Both.
+  bool end(Clock::time_point deadline) {
+    if (!halt(deadline)) return false;
+    finish();
+    return true;
+  }
   /// Carries out what a failure asks for, and looks after the watchdog. Called often.
   void tick(Clock::time_point now);
 
@@ -89,6 +99,7 @@ class ComponentSlot {
   Clock::time_point restart_at_{};
   Clock::time_point launched_at_{};
   bool hang_reported_ = false;
+  std::shared_ptr<std::atomic<bool>> started_;  ///< start() returned: there may be results.
 };
 
 }  // namespace camvox::bringup

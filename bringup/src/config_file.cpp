@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <optional>
 #include <sstream>
 
 #include "camvox/bringup/system_config.hpp"
@@ -11,7 +12,18 @@
 namespace camvox::bringup {
 namespace {
 
-const std::vector<std::string> kSections = {"container", "topics", "components"};
+const std::vector<std::string> kSections = {
+    "container", "topics", "parameters", "parameter_files", "components"};
+
+std::optional<std::string> read_text(const std::filesystem::path& file) {
+  std::error_code ignored;
+  std::ifstream stream(file);
+  std::ostringstream text;
+  if (std::filesystem::is_directory(file, ignored) || !stream || !(text << stream.rdbuf())) {
+    return std::nullopt;
+  }
+  return text.str();
+}
 
 /// Reads one config; its members run through the file from top to bottom.
 class ConfigFileReader {
@@ -34,6 +46,10 @@ class ConfigFileReader {
         container_ = yaml_.parameters(node, key);
       } else if (key == "topics") {
         read_topics(node);
+      } else if (key == "parameters") {
+        add_shared(yaml_.parameters(node, key));
+      } else if (key == "parameter_files") {
+        read_parameter_files(node);
       } else if (key == "components") {
         components.reset(node);
       } else {
@@ -41,6 +57,16 @@ class ConfigFileReader {
       }
     });
     if (components.IsDefined() && !components.IsNull()) read_components(components);
+  }
+
+  /// Files of shared parameters from the command line: they win over the config.
+  void add_parameter_files(const std::vector<std::filesystem::path>& files) {
+    for (const auto& file : files) {
+      for (auto& [key, parameter] : read_parameter_file(file, {"--parameters", 0})) {
+        config_.shared_parameters.insert_or_assign(key, parameter);
+        config_.file_parameters.insert(key);
+      }
+    }
   }
 
   /// Overrides go on top of what the file says, before types and ranges are checked.
@@ -95,6 +121,47 @@ class ConfigFileReader {
           load(yaml_.parameters(node, path), config_.topics[topic], path);
           report_bad_topic(topic, {origin_, line}, path);
         });
+  }
+
+  /// A config's own shared parameters stand over those of its files, whatever comes first.
+  void add_shared(const ParameterMap& parameters) {
+    for (const auto& [key, parameter] : parameters) {
+      config_.shared_parameters.insert_or_assign(key, parameter);
+      config_.file_parameters.erase(key);
+    }
+  }
+
+  void read_parameter_files(const YAML::Node& list) {
+    if (!list.IsSequence())
+      return yaml_.report(list, "parameter_files", "expected a list of files");
+    const auto folder = std::filesystem::path(origin_).parent_path();
+    for (const auto& node : list) {
+      if (!node.IsScalar()) {
+        yaml_.report(node, "parameter_files", "expected a file name");
+        continue;
+      }
+      for (auto& [key, parameter] :
+           read_parameter_file(folder / node.Scalar(), yaml_.location(node))) {
+        if (config_.shared_parameters.emplace(key, parameter).second) {
+          config_.file_parameters.insert(key);
+        }
+      }
+    }
+  }
+
+  ParameterMap read_parameter_file(const std::filesystem::path& file, const Location& named_at) {
+    const auto text = read_text(file);
+    if (!text) {
+      problems_.push_back({named_at, "parameter_files", file.string() + " cannot be read"});
+      return {};
+    }
+    try {
+      YamlReader reader(file, problems_);
+      return reader.parameters(YAML::Load(*text), "");
+    } catch (const YAML::Exception& error) {
+      problems_.push_back({{file, error.mark.line + 1}, "", "not valid YAML: " + error.msg});
+      return {};
+    }
   }
 
   void report_bad_topic(const std::string& topic,
@@ -160,7 +227,8 @@ class ConfigFileReader {
 
   ParameterMap* parameters_of(const std::string& owner, const Location& origin) {
     if (owner == "container") return &container_;
-    std::vector<std::string> names = {"container"};
+    if (owner == "parameters") return &config_.shared_parameters;
+    std::vector<std::string> names = {"container", "parameters"};
     for (auto& component : config_.components) {
       if (component.name == owner) return &component.parameters;
       names.push_back(component.name);
@@ -218,12 +286,13 @@ class ConfigFileReader {
 
 ConfigReadout parse_config(const std::string& text,
                            const std::string& origin,
-                           const std::vector<std::string>& overrides) {
+                           const ConfigOverrides& overrides) {
   ConfigReadout readout;
   try {
     ConfigFileReader reader(origin, readout);
     reader.read(YAML::Load(text));
-    reader.override_with(overrides);
+    reader.add_parameter_files(overrides.parameter_files);
+    reader.override_with(overrides.values);
     reader.check();
   } catch (const YAML::Exception& error) {
     readout.problems.push_back({{origin, error.mark.line + 1}, "", "not valid YAML: " + error.msg});
@@ -233,16 +302,15 @@ ConfigReadout parse_config(const std::string& text,
 }
 
 ConfigReadout read_config_file(const std::filesystem::path& file,
-                               const std::vector<std::string>& overrides) {
-  std::error_code ignored;
-  std::ifstream stream(file);
-  std::ostringstream text;
-  if (std::filesystem::is_directory(file, ignored) || !stream || !(text << stream.rdbuf())) {
+                               const ConfigOverrides& overrides) {
+  const auto text = read_text(file);
+  if (!text) {
+    std::error_code ignored;
     const bool exists = std::filesystem::exists(file, ignored);
     return {{},
             {{{file, 0}, "", exists ? "cannot be read, or is empty" : "there is no such file"}}};
   }
-  return parse_config(text.str(), file, overrides);
+  return parse_config(*text, file, overrides);
 }
 
 config::Value parse_value(const std::string& yaml,
@@ -263,7 +331,7 @@ config::Value parse_value(const std::string& yaml,
 std::string component_name_problem(std::string_view name) {
   static constexpr std::string_view kLetters =
       "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz_0123456789";
-  if (name == "container") return "'container' is reserved";
+  if (name == "container" || name == "parameters") return "'" + std::string(name) + "' is reserved";
   if (name.find_first_not_of(kLetters) != std::string_view::npos) {
     return "'" + std::string(name) + "' may hold only letters, digits and '_'";
   }

@@ -73,7 +73,8 @@ struct Container::Implementation {
   void start(Container& self);
   void start_control(Container& self);
   ComponentSlot& add(const ComponentConfig& component, ProbedComponent found);
-  std::vector<std::string> end_components(Clock::time_point deadline);
+  std::vector<std::string> end_components(Clock::time_point deadline,
+                                          const std::function<void()>& before_saving);
   void tick();
   std::vector<Problem> problems_of(const ComponentConfig& component, const ProbedComponent& found);
   ComponentSlot* find(std::uint64_t id);
@@ -173,12 +174,19 @@ void Container::Implementation::tick() {
   for (const auto& slot : slots) slot->tick(Clock::now());
 }
 
-std::vector<std::string> Container::Implementation::end_components(Clock::time_point deadline) {
+std::vector<std::string> Container::Implementation::end_components(
+    Clock::time_point deadline, const std::function<void()>& before_saving) {
   std::vector<std::string> hung;
   for (const auto& slot : slots) slot->close();
   for (const auto& slot : slots) {
     doing("ending component '" + slot->config().name + "'");
-    if (!slot->end(deadline)) hung.push_back(slot->config().name);
+    if (!slot->halt(deadline)) hung.push_back(slot->config().name);
+  }
+  if (before_saving) before_saving();
+  for (const auto& slot : slots) {  // a hung one does not keep the others from saving
+    if (std::find(hung.begin(), hung.end(), slot->config().name) != hung.end()) continue;
+    doing("saving results of component '" + slot->config().name + "'");
+    slot->finish();
   }
   return hung;
 }
@@ -230,7 +238,12 @@ void Container::start() {
   implementation_->start(*this);
 }
 
-std::vector<std::string> Container::stop(std::chrono::milliseconds timeout) {
+void Container::on_exit_request(std::function<void()> callback) {
+  implementation_->environment.exit_request = std::move(callback);
+}
+
+std::vector<std::string> Container::stop(std::chrono::milliseconds timeout,
+                                         const std::function<void()>& before_saving) {
   auto& self = *implementation_;
   const auto deadline = Clock::now() + timeout;
   self.doing("ending the container's own services");
@@ -239,7 +252,7 @@ std::vector<std::string> Container::stop(std::chrono::milliseconds timeout) {
   const bool services_ended = self.services == nullptr || self.services->end(kControlTimeout);
   if (!control_ended || !services_ended) return {self.config.container.name};
   const std::lock_guard lock(self.mutex);
-  hung = self.end_components(deadline);
+  hung = self.end_components(deadline, before_saving);
   if (!hung.empty()) return hung;  // their threads live on: nothing more can be taken down
   self.doing("leaving the domain");
   self.slots.clear();
@@ -253,10 +266,14 @@ std::vector<std::string> Container::stop(std::chrono::milliseconds timeout) {
   return {};
 }
 
-ComponentInfo Container::load(const ComponentConfig& component) {
+ComponentInfo Container::load(const ComponentConfig& given) {
   auto& self = *implementation_;
+  auto component = given;
   const auto factory = self.environment.plugins->factory(component.plugin);
-  const auto found = probe_component(component, *factory);
+  auto found = probe_component(component, *factory);
+  if (give_shared_parameters(self.config.shared_parameters, found, component)) {
+    found = probe_component(component, *factory);
+  }
   const std::lock_guard lock(self.mutex);
   if (!self.running) throw std::runtime_error("the container does not run");
   if (const auto problems = self.problems_of(component, found); !problems.empty()) {

@@ -145,16 +145,20 @@ std::vector<Problem> check_wiring(const SystemConfig& config,
   return WiringCheck(config, components).run(missing);
 }
 
-ProbedSystem probe_system(const SystemConfig& config, PluginLoader& plugins) {
+ProbedSystem probe_system(SystemConfig& config, PluginLoader& plugins) {
   ProbedSystem system;
-  for (const auto& component : config.components) {
-    system.components.push_back(component.plugin.empty()
-                                    ? ProbedComponent{component.name, {}, {}, {}}
-                                    : probe_plugin(component, plugins));
-    const auto& problems = system.components.back().problems;
-    system.problems.insert(system.problems.end(), problems.begin(), problems.end());
+  for (auto& component : config.components) {
+    auto probed = component.plugin.empty() ? ProbedComponent{component.name, {}, {}, {}}
+                                           : probe_plugin(component, plugins);
+    if (give_shared_parameters(config.shared_parameters, probed, component)) {
+      probed = probe_plugin(component, plugins);
+    }
+    system.problems.insert(system.problems.end(), probed.problems.begin(), probed.problems.end());
+    system.components.push_back(std::move(probed));
   }
   if (all_complete(system.components)) {
+    const auto unused = unused_shared_parameters(config, system.components);
+    system.problems.insert(system.problems.end(), unused.begin(), unused.end());
     const auto wiring = check_wiring(config, system.components);
     system.problems.insert(system.problems.end(), wiring.begin(), wiring.end());
   }

@@ -62,15 +62,17 @@ ReplayComponent::ReplayComponent(Context& context)
     clock_ = context.advertise<rosgraph_msgs::msg::Clock>({"clock", topics::kClock},
                                                           {.qos = qos::kClock});
   }
-  if (!config_.lockstep) return;
+  if (!config_.lockstep && !config_.exit_at_end) return;
   context.subscribe<camvox_interfaces::msg::Progress>(
       {"progress", topics::kProgress},
       [this](const Sample<camvox_interfaces::msg::Progress>& sample) {
         const auto& name = sample->component_name();
         gate_.done({name.data(), strnlen(name.data(), name.size())}, sample->header().stamp_ns());
         if (player_) player_->poke();
+        last_activity_ns_ = context_.now_ns();
       },
-      {.qos = qos::kKeyframes, .required = !config_.lockstep_components.empty()});
+      {.qos = qos::kKeyframes,
+       .required = config_.lockstep && !config_.lockstep_components.empty()});
 }
 
 ReplayComponent::~ReplayComponent() = default;
@@ -115,7 +117,9 @@ void ReplayComponent::advertise_topics(const storage::BagReader& bag) {
     const std::string name = remapped(topic.name, config_.remap);
     const PublishOptions options{.qos = recorded_qos(topic.offered_qos_profiles), .max_loans = 2};
     publishers_.push_back(context_.advertise_raw({topic.name, name}, topic.type, options));
-    is_frame_.push_back(config_.lockstep && topic.name == config_.lockstep_topic);
+    const bool frames = topic.name == config_.lockstep_topic ||
+                        topic.name == config_.lockstep_topic + "/compressed";
+    is_frame_.push_back(config_.lockstep && frames);
   }
 }
 
@@ -131,8 +135,17 @@ void ReplayComponent::report() {
   const auto state = player_->state();
   context_.diagnostics().set("sent", state.sent);
   context_.diagnostics().set("rate", state.rate);
-  if (!state.finished || end_reported_) return;
+  if (!state.finished) return;
+  if (!end_reported_) return report_end(state);
+  const auto settle_ns = static_cast<std::int64_t>(config_.settle_s * 1e9);
+  if (config_.exit_at_end && context_.now_ns() - last_activity_ns_ >= settle_ns) {
+    context_.request_exit();
+  }
+}
+
+void ReplayComponent::report_end(const recording::PlayerState& state) {
   end_reported_ = true;
+  last_activity_ns_ = context_.now_ns();
   if (state.status.ok()) {
     context_.log().info("end of {}: {} messages sent", config_.bag, state.sent);
   } else {

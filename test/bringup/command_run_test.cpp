@@ -1,7 +1,10 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <filesystem>
+#include <fstream>
 
+#include "camvox/storage/bag_writer.hpp"
 #include "command_fixture.hpp"
 
 namespace camvox::bringup {
@@ -54,6 +57,72 @@ TEST_F(CommandRun, SecondSignalExitsAtOnce) {
   kill(container_->pid(), SIGINT);
   ASSERT_TRUE(container_->wrote("stops"));
   EXPECT_EQ(stop(), 130) << container_->output();
+}
+
+std::string saved_by(const std::string& folder, const std::string& name) {
+  std::ifstream file(std::filesystem::path(folder) / name);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+// Saving may take longer than callbacks may, and one that fails or hangs keeps nobody else from it.
+TEST_F(CommandRun, EveryComponentSavesItsResults) {
+  const auto folder = write("results", "") + ".d";
+  run("components:\n"
+      "  - {plugin: test::Saver, name: slow, parameters: {save_s: 2.5}}\n"
+      "  - {plugin: test::Saver, name: broken, parameters: {fail: true}}\n"
+      "  - {plugin: test::Ticker, name: stuck, watchdog_s: 0.1, parameters: {hang_s: 60.0}}\n"
+      "  - {plugin: test::Saver, name: last}\n",
+      {"--out", folder});
+  ASSERT_TRUE(container_->wrote("[stuck]: a callback has been running")) << container_->output();
+  EXPECT_EQ(stop(), 3);
+  EXPECT_EQ(saved_by(folder, "slow"), "saved");
+  EXPECT_EQ(saved_by(folder, "last"), "saved");
+  EXPECT_THAT(container_->output(), HasSubstr("[broken]: while stopping: disk full"));
+  EXPECT_THAT(saved_by(folder, "config.yaml"), HasSubstr("plugin: test::Saver"));
+}
+
+TEST_F(CommandRun, SavingThatDoesNotEndIsCutOffAndNamed) {
+  const auto folder = write("results", "") + ".d";
+  run("container: {save_timeout_s: 0.5}\ncomponents:\n"
+      "  - {plugin: test::Saver, name: endless, parameters: {save_s: 600.0}}\n",
+      {"--out", folder, "--overwrite"});
+  EXPECT_EQ(stop(), 3);
+  EXPECT_THAT(container_->output(), HasSubstr("saving results of component 'endless'"));
+}
+
+TEST_F(CommandRun, ResultsAreNotOverwrittenUnasked) {
+  const auto folder = std::filesystem::path(write("full", "")).parent_path();
+  const auto result = command({"run", write("rig.yaml", kTicker), "--out", folder});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.output, HasSubstr("is not empty; choose another folder, or add --overwrite"));
+}
+
+TEST_F(CommandRun, EndsWithTheBagThatItReplays) {
+  const auto bag = write("empty", "") + ".bag";
+  const auto output = write("empty", "") + ".out";
+  std::filesystem::remove_all(bag);
+  std::filesystem::remove_all(output);
+  {
+    auto writer = storage::BagWriter::create(bag);
+    ASSERT_TRUE(writer.ok()) << writer.status().message();
+    ASSERT_TRUE((*writer)->close().ok());
+  }
+  const auto result =
+      command({"run", write("rig.yaml", kTicker), "--bag", bag, "--set", "ticker.hang_s=0.0"});
+  EXPECT_EQ(result.exit_code, 0) << result.output;
+  EXPECT_THAT(result.output, HasSubstr("0 messages sent"));
+}
+
+TEST_F(CommandRun, ParameterFilesServeEveryComponentThatHasTheParameter) {
+  const auto rig = write("shared.yaml", "hang_s: 0.002\nunused_block: {x: 1}\n");
+  const auto result =
+      command({"run", write("rig.yaml", kTicker), "--print-config", "--parameters", rig});
+  EXPECT_EQ(result.exit_code, 0) << result.output;
+  EXPECT_THAT(result.output, HasSubstr("hang_s: 0.002  # " + rig + ":1"));
+  const auto missing =
+      command({"run", write("rig.yaml", kTicker), "--check", "--parameters", "/no/such.yaml"});
+  EXPECT_EQ(missing.exit_code, 1);
+  EXPECT_THAT(missing.output, HasSubstr("/no/such.yaml cannot be read"));
 }
 
 TEST_F(CommandRun, ExitCodeTellsThatAComponentHasFailed) {

@@ -14,7 +14,7 @@ using ::testing::IsEmpty;
 std::vector<std::string> problems_of(const std::string& text,
                                      const std::vector<std::string>& overrides = {}) {
   std::vector<std::string> texts;
-  for (const auto& problem : parse_config(text, "rig.yaml", overrides).problems) {
+  for (const auto& problem : parse_config(text, "rig.yaml", {overrides, {}}).problems) {
     texts.push_back(problem.to_string());
   }
   return texts;
@@ -38,6 +38,8 @@ container:
   watchdog_s: 2
 topics:
   /camvox/cloud: {zero_copy: interprocess, max_blocking_ms: 5}
+parameters:
+  camera: {fx_px: 500.0}
 components:
   - plugin: camvox::SyncComponent
     name: sync
@@ -53,7 +55,8 @@ components:
 )",
                                     "rig.yaml");
   ASSERT_THAT(readout.problems, IsEmpty());
-  const auto& [container, topics, locations, components] = readout.config;
+  const auto& [container, shared, from_files, topics, locations, components] = readout.config;
+  EXPECT_EQ(shared.at("camera.fx_px").value, config::Value(500.0));
   EXPECT_EQ(container.name, "rig");
   EXPECT_EQ(container.domain_id, 7);
   EXPECT_EQ(container.network, "subnet");
@@ -168,10 +171,10 @@ TEST(ConfigFile, IntegersBeyond64BitsAreRefused) {
 
 TEST(ConfigFile, OverridesWinOverTheFile) {
   const std::string text = "components:\n  - {plugin: a, name: sync, parameters: {x: 1}}\n";
-  const auto readout =
-      parse_config(text,
-                   "rig.yaml",
-                   {"sync.x=2.5", "sync.ransac.n=3", "sync.mode=slow", "container.domain_id=5"});
+  const auto readout = parse_config(
+      text,
+      "rig.yaml",
+      {{"sync.x=2.5", "sync.ransac.n=3", "sync.mode=slow", "container.domain_id=5"}, {}});
   EXPECT_THAT(readout.problems, IsEmpty());
   const auto& parameters = readout.config.components.at(0).parameters;
   EXPECT_EQ(parameters.at("x").value, config::Value(2.5));
@@ -184,12 +187,13 @@ TEST(ConfigFile, BadOverridesNameThemselves) {
   const std::string text = "components:\n  - {plugin: a, name: sync}\n";
   EXPECT_THAT(
       problems_of(text, {"sync", "snyc.x=1", "container.domain_id=-1", "sync.x=[1, a]"}),
-      ElementsAre("--set sync: expected component.parameter=value",
-                  "--set snyc.x=1: there is no component 'snyc' (there are container, sync)",
-                  "--set sync.x=[1, a]: all values of a list must have one type (write "
-                  "1.0, not 1, among doubles)",
-                  "--set container.domain_id=-1: container.domain_id: -1 must be at least "
-                  "0"));
+      ElementsAre(
+          "--set sync: expected component.parameter=value",
+          "--set snyc.x=1: there is no component 'snyc' (there are container, parameters, sync)",
+          "--set sync.x=[1, a]: all values of a list must have one type (write "
+          "1.0, not 1, among doubles)",
+          "--set container.domain_id=-1: container.domain_id: -1 must be at least "
+          "0"));
 }
 
 TEST(ConfigFile, MissingFileIsNamed) {

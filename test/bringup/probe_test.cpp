@@ -14,7 +14,7 @@ const std::string kPoseSink = "  - {plugin: test::PoseSink, name: sink}\n";
 
 ProbedSystem probe(const std::string& text) {
   PluginLoader plugins(find_plugins({PLUGIN_PREFIX}));
-  const auto [config, problems] = parse_config(text, "rig.yaml");
+  auto [config, problems] = parse_config(text, "rig.yaml");
   EXPECT_THAT(problems, IsEmpty());
   return probe_system(config, plugins);
 }
@@ -146,20 +146,50 @@ TEST(Probe, PluginsThatCannotBeLoadedAreListedTogether) {
   EXPECT_THAT(problems[2], HasSubstr("rig.yaml:4: c.plugin: no installed package offers"));
 }
 
+TEST(Probe, SharedParametersGoToComponentsThatHaveThem) {
+  auto [config, problems] =
+      parse_config("parameters: {limit_m: 4.0, ransac: {count: 9}}\ncomponents:\n" + kPoseSource +
+                       "  - {plugin: test::PoseSink, name: sink, parameters: {limit_m: 2.0}}\n",
+                   "rig.yaml",
+                   {{"parameters.mode=slow"}, {}});
+  EXPECT_THAT(problems, IsEmpty());
+  PluginLoader plugins(find_plugins({PLUGIN_PREFIX}));
+  const auto system = probe_system(config, plugins);
+  EXPECT_THAT(system.problems, IsEmpty());
+  const auto& parameters = system.components.at(1).effective_parameters;
+  EXPECT_EQ(parameters.at("limit_m").value, config::Value(2.0)) << "its own wins";
+  EXPECT_EQ(parameters.at("ransac.count").value, config::Value(std::int64_t{9}));
+  EXPECT_EQ(parameters.at("ransac.count").location.to_string(), "rig.yaml:1");
+  EXPECT_EQ(parameters.at("mode").value, config::Value(std::string("slow")));
+}
+
+TEST(Probe, SharedParametersThatNobodyHasAreAnError) {
+  const auto system = probe("parameters: {limit: 4.0, ransac: {cuont: 9}, zzz: 1}\ncomponents:\n" +
+                            kPoseSource + kPoseSink);
+  std::vector<std::string> texts;
+  for (const auto& problem : system.problems) texts.push_back(problem.to_string());
+  EXPECT_THAT(texts,
+              ElementsAre("rig.yaml:1: parameters.limit: no component has this parameter (did you "
+                          "mean 'limit_m'?)",
+                          "rig.yaml:1: parameters.ransac.cuont: no component has this parameter "
+                          "(did you mean 'ransac.count'?)",
+                          "rig.yaml:1: parameters.zzz: no component has this parameter"));
+}
+
 TEST(EffectiveConfig, ShowsDefaultsAndOriginsAndReadsBack) {
   const std::string text = "topics:\n  /test/pose: {max_blocking_ms: 7}\ncomponents:\n" +
                            kPoseSource +
                            "  - {plugin: test::PoseSink, name: sink, executor: two words,\n"
                            "     parameters: {limit_m: 2.0}}\n";
   PluginLoader plugins(find_plugins({PLUGIN_PREFIX}));
-  const auto config = parse_config(text, "rig.yaml").config;
+  auto config = parse_config(text, "rig.yaml").config;
   const auto effective = effective_config(config, probe_system(config, plugins).components);
   EXPECT_THAT(effective, HasSubstr("      limit_m: 2.0  # rig.yaml:6\n"));
   EXPECT_THAT(effective, HasSubstr("      ransac.count: 3  # default\n"));
   EXPECT_THAT(effective, HasSubstr("      imu: /imu  # in, sensor_msgs/msg/Imu\n"));
   EXPECT_THAT(effective, HasSubstr("  watchdog_s: 5.0\n"));
 
-  const auto again = parse_config(effective, "effective.yaml");
+  auto again = parse_config(effective, "effective.yaml");
   EXPECT_THAT(again.problems, IsEmpty());
   const auto probed = probe_system(again.config, plugins);
   EXPECT_THAT(probed.problems, IsEmpty());

@@ -1,6 +1,8 @@
 // Components that misbehave when told to, for the life of a container.
 #include <atomic>
 #include <chrono>
+#include <filesystem>
+#include <fstream>
 #include <stdexcept>
 #include <thread>
 
@@ -84,7 +86,38 @@ class Fixed : public camvox::Component {
   explicit Fixed(Context& context) { (void)context.parameters<FixedConfig>(); }
 };
 
+struct SaverConfig {
+  std::string output_dir;
+  double save_s = 0.0;  ///< How long saving takes.
+  bool fail = false;
+
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& field) {
+    field("output_dir", self.output_dir);
+    field("save_s", self.save_s);
+    field("fail", self.fail);
+  }
+};
+
+/// Writes "<output_dir>/<name>" when it ends.
+class Saver : public camvox::Component {
+ public:
+  explicit Saver(Context& context)
+      : name_(context.name()), config_(context.parameters<SaverConfig>()) {}
+
+  void stop() override {
+    if (config_.fail) throw std::runtime_error("disk full");
+    std::this_thread::sleep_for(std::chrono::duration<double>(config_.save_s));
+    std::ofstream(std::filesystem::path(config_.output_dir) / name_) << "saved";
+  }
+
+ private:
+  std::string name_;
+  SaverConfig config_;
+};
+
 }  // namespace test
 
 CAMVOX_REGISTER_COMPONENT(test::Ticker)
 CAMVOX_REGISTER_COMPONENT(test::Fixed)
+CAMVOX_REGISTER_COMPONENT(test::Saver)

@@ -75,6 +75,25 @@ TEST(ReplayComponent, LockstepSendsTheNextFrameWhenTheLastIsDone) {
   ASSERT_TRUE(run_until(fake, [&] { return logged(fake, "4 messages sent"); }));
 }
 
+TEST(ReplayComponent, AsksForTheExitOnceNothingIsReportedDoneAnyMore) {
+  const TemporaryFolder folder;
+  recording::write_bag(folder.file("bag"), {{"/a", 0.0, 7}});
+  FakeContext fake;
+  fake.set_parameter("bag", folder.file("bag"));
+  fake.set_parameter("exit_at_end", true);
+  fake.set_parameter("settle_s", 1.0);
+  ReplayComponent replay(fake);
+  replay.start();
+  ASSERT_TRUE(run_until(fake, [&] { return logged(fake, "1 messages sent"); }));
+  fake.advance(std::chrono::milliseconds(800));
+  EXPECT_FALSE(fake.exit_requested());
+  fake.send<Progress>("progress", [](Progress&) {});
+  fake.advance(std::chrono::milliseconds(800));
+  EXPECT_FALSE(fake.exit_requested()) << "somebody was still at work";
+  fake.advance(std::chrono::milliseconds(400));
+  EXPECT_TRUE(fake.exit_requested());
+}
+
 TEST(ReplayComponent, PublishesTheClockOfTheRecording) {
   const TemporaryFolder folder;
   recording::write_bag(folder.file("bag"), {{"/a", 0.0, 7}});

@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -59,8 +60,14 @@ class Container {
 
   /// Ends all components and leaves the domain. Returns the names of components that hang; the
   /// process must then end without destructors (std::_Exit), because their threads live on.
-  std::vector<std::string> stop(
-      std::chrono::milliseconds timeout = std::chrono::milliseconds(1500));
+  /// `timeout` is for callbacks to return; then `before_saving` is called, and each component
+  /// saves its results, however long that takes.
+  std::vector<std::string> stop(std::chrono::milliseconds timeout = std::chrono::milliseconds(1500),
+                                const std::function<void()>& before_saving = {});
+
+  /// What to do when a component has finished its work (Context::request_exit); before start.
+  /// Called on a component's thread, so it must not call stop itself.
+  void on_exit_request(std::function<void()> callback);
 
   /// Adds a component. Throws std::runtime_error with all reasons why it cannot be.
   ComponentInfo load(const ComponentConfig& component);

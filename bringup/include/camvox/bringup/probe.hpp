@@ -38,8 +38,20 @@ struct ProbedSystem {
   std::vector<Problem> problems;            ///< Sorted by line.
 };
 
-/// Checks everything that the file alone does not tell: plugins, parameters, ports, wiring.
-[[nodiscard]] ProbedSystem probe_system(const SystemConfig& config, PluginLoader& plugins);
+/// Checks everything that the file alone does not tell: plugins, parameters, ports, wiring. Shared
+/// parameters are given to the components that have them.
+[[nodiscard]] ProbedSystem probe_system(SystemConfig& config, PluginLoader& plugins);
+
+/// Gives a component, which was probed, those shared parameters that it has and was not given.
+/// True if there were any; it must then be probed again.
+bool give_shared_parameters(const ParameterMap& shared,
+                            const ProbedComponent& probed,
+                            ComponentConfig& component);
+
+/// Shared parameters that no component has, unless they come from a parameter file and no
+/// component has anything of their block ("camera", "rig").
+[[nodiscard]] std::vector<Problem> unused_shared_parameters(
+    const SystemConfig& config, const std::vector<ProbedComponent>& components);
 
 /// Whether a required input that nothing publishes is a problem.
 enum class MissingWriters { kForbidden, kAllowed };

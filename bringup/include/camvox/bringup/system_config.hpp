@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <map>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -26,7 +27,8 @@ struct ContainerConfig {
   std::string log_level = "info";
   std::vector<std::string> external_topics;  ///< Internal topics that another container publishes.
   double diagnostics_period_s = 1.0;
-  double watchdog_s = 5.0;  ///< A callback that runs longer is reported; 0: never.
+  double watchdog_s = 5.0;       ///< A callback that runs longer is reported; 0: never.
+  double save_timeout_s = 60.0;  ///< For components to save their results at the end.
 
   template <typename Self, typename Visitor>
   static void visit(Self& self, Visitor&& field) {
@@ -49,6 +51,7 @@ struct ContainerConfig {
           config::at_least(0.05),
           config::at_most(3600.0));
     field("watchdog_s", self.watchdog_s, config::at_least(0.0), config::at_most(86400.0));
+    field("save_timeout_s", self.save_timeout_s, config::at_least(0.0), config::at_most(86400.0));
   }
 };
 
@@ -94,6 +97,10 @@ struct ComponentConfig {
 /// A whole config file.
 struct SystemConfig {
   ContainerConfig container;
+  /// Section `parameters` and the files of `parameter_files`: for every component that has a
+  /// parameter of that name and is not given its own.
+  ParameterMap shared_parameters;
+  std::set<std::string> file_parameters;  ///< Which of them come from a file.
   std::map<std::string, TopicConfig, std::less<>> topics;
   std::map<std::string, Location, std::less<>> topic_locations;
   std::vector<ComponentConfig> components;
@@ -105,15 +112,23 @@ struct ConfigReadout {
   std::vector<Problem> problems;
 };
 
-/// Reads a config file. `overrides` are "component.parameter=value" or "container.key=value",
-/// with values as in YAML; they win over the file.
-[[nodiscard]] ConfigReadout read_config_file(const std::filesystem::path& file,
-                                             const std::vector<std::string>& overrides = {});
+/// What the command line adds to a config file.
+struct ConfigOverrides {
+  /// "component.parameter=value", "container.key=value" or "parameters.key=value" (shared), with
+  /// values as in YAML; they win over all files.
+  std::vector<std::string> values;
+  /// Files of shared parameters; they win over the config's own shared parameters.
+  std::vector<std::filesystem::path> parameter_files;
+};
 
-/// The same from text; `origin` takes the place of the file name in messages.
+/// Reads a config file. Paths in its `parameter_files` are relative to its folder.
+[[nodiscard]] ConfigReadout read_config_file(const std::filesystem::path& file,
+                                             const ConfigOverrides& overrides = {});
+
+/// The same from text; `origin` takes the place of the file name.
 [[nodiscard]] ConfigReadout parse_config(const std::string& text,
                                          const std::string& origin,
-                                         const std::vector<std::string>& overrides = {});
+                                         const ConfigOverrides& overrides = {});
 
 /// A value written as YAML ("1", "1.0", "text", "[1, 2]") with its ROS type. Problems, if any, are
 /// appended and name `location`.

@@ -83,6 +83,11 @@ class ComponentContext final : public Context {
   [[nodiscard]] std::vector<TopicDescription> topics() const override;
   void every(std::chrono::nanoseconds period, std::function<void()> callback) override;
   void post(std::function<void()> callback) override;
+  void request_exit() override {
+    if (exit_request_) exit_request_();
+  }
+  /// What request_exit does; before the component is made.
+  void on_exit_request(std::function<void()> callback) { exit_request_ = std::move(callback); }
 
  protected:
   [[nodiscard]] const config::ParameterMap& given_parameters() const override {
@@ -124,6 +129,7 @@ class ComponentContext final : public Context {
   mutable std::mutex effective_mutex_;  // changed on the component's thread, read on any
   config::ParameterMap effective_;
   ChangeHandler change_handler_;
+  std::function<void()> exit_request_;
   bool active_ = false;
   std::vector<std::function<void()>> pending_;
   std::vector<std::pair<std::string, Subscription>> subscriptions_;

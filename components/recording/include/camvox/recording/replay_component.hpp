@@ -24,9 +24,11 @@ struct ReplayConfig {
   double clock_hz = 0.0;            ///< Publishes /clock this often; 0: never.
   int read_ahead_mb = 256;          ///< Bound of what is read ahead.
   bool lockstep = false;            ///< As fast as all listed components keep up, nothing dropped.
-  std::string lockstep_topic = "/camera/image_raw";  ///< Its messages are the frames.
+  std::string lockstep_topic = "/camera/image_raw";  ///< Or compressed: the frames.
   std::vector<std::string> lockstep_components;      ///< Who reports each frame done.
   int frames_in_flight = 2;  ///< Frames sent before the first of them must be done.
+  bool exit_at_end = false;  ///< Ends the container when the recording is over.
+  double settle_s = 2.0;     ///< How long nothing must be reported done before that.
 
   template <typename Self, typename Visitor>
   static void visit(Self& self, Visitor&& field) {
@@ -43,6 +45,8 @@ struct ReplayConfig {
     field("lockstep_topic", self.lockstep_topic);
     field("lockstep_components", self.lockstep_components);
     field("frames_in_flight", self.frames_in_flight, config::at_least(1));
+    field("exit_at_end", self.exit_at_end);
+    field("settle_s", self.settle_s, config::at_least(0.0), config::at_most(3600.0));
   }
 };
 
@@ -61,6 +65,7 @@ class ReplayComponent final : public Component {
   void advertise_topics(const storage::BagReader& bag);
   void send(recording::PlayedMessage&& message);
   void report();
+  void report_end(const recording::PlayerState& state);
 
   Context& context_;
   ReplayConfig config_;
@@ -70,6 +75,7 @@ class ReplayComponent final : public Component {
   std::vector<bool> is_frame_;                     // same
   std::unique_ptr<recording::Player> player_;
   bool end_reported_ = false;
+  std::int64_t last_activity_ns_ = 0;  // when the end was reached, or a frame reported done
 };
 
 }  // namespace camvox
