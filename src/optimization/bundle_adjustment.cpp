@@ -1,0 +1,137 @@
+#include "camvox/optimization/bundle_adjustment.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <stdexcept>
+
+#include "bundle_solver.hpp"
+
+namespace camvox::optimization {
+namespace {
+
+void check(const BundleProblem& problem) {
+  for (const auto& observation : problem.observations) {
+    if (observation.pose >= problem.poses.size() ||
+        observation.point >= problem.points_world.size()) {
+      throw std::logic_error("bundle adjustment: observation of a pose or point that is not there");
+    }
+  }
+}
+
+std::optional<PointResidual> residual_of(const BundleProblem& problem,
+                                         const BundleObservation& observation) {
+  return evaluate(problem.poses[observation.pose].T_world_camera,
+                  problem.points_world[observation.point],
+                  observation.observation,
+                  problem.camera,
+                  problem.depth_model);
+}
+
+/// Judges the observations listed in `judged` at the present poses and points.
+void gate(BundleProblem& problem,
+          const std::vector<std::uint32_t>& judged,
+          const BundleAdjustmentConfig& config) {
+  for (const auto i : judged) {
+    auto& observation = problem.observations[i];
+    const auto residual = residual_of(problem, observation);
+    observation.outlier = !residual || !(residual->r.head<2>().squaredNorm() <= config.pixel_gate);
+    observation.depth_outlier =
+        !observation.outlier && !(residual->r[2] * residual->r[2] <= config.depth_gate);
+  }
+}
+
+/// Takes out what is behind its camera, where the cost is not defined, or NaN.
+void drop_unseen(BundleProblem& problem, const std::vector<std::uint32_t>& judged) {
+  for (const auto i : judged) {
+    auto& observation = problem.observations[i];
+    const auto residual = residual_of(problem, observation);
+    if (!residual || !residual->r.allFinite()) observation.outlier = true;
+  }
+}
+
+std::vector<std::uint32_t> unflagged(const BundleProblem& problem) {
+  std::vector<std::uint32_t> list;
+  for (std::uint32_t i = 0; i < problem.observations.size(); ++i) {
+    if (!problem.observations[i].outlier) list.push_back(i);
+  }
+  return list;
+}
+
+double robust_cost(const BundleProblem& problem,
+                   const std::vector<std::uint32_t>& counted,
+                   const BundleAdjustmentConfig& config) {
+  double sum = 0.0;
+  for (const auto i : counted) {
+    const auto residual = residual_of(problem, problem.observations[i]);
+    if (!residual) continue;  // moved behind the camera: an outlier, of no defined cost
+    sum += internal::huber(residual->r.head<2>().squaredNorm(), config.pixel_gate).value;
+    sum += internal::huber(residual->r[2] * residual->r[2], config.depth_gate).value;
+  }
+  return 0.5 * sum;
+}
+
+bool is_set(const std::atomic<bool>* stop) {
+  return stop != nullptr && stop->load(std::memory_order_relaxed);
+}
+
+void count(const BundleProblem& problem, BundleSummary& summary) {
+  for (const auto& pose : problem.poses) ++(pose.fixed ? summary.fixed_poses : summary.free_poses);
+  summary.points = problem.points_world.size();
+  summary.observations = problem.observations.size();
+}
+
+}  // namespace
+
+BundleSummary adjust(BundleProblem& problem,
+                     const BundleAdjustmentConfig& config,
+                     const std::atomic<bool>* stop) {
+  check(problem);
+  BundleSummary summary;
+  count(problem, summary);
+  drop_unseen(problem, unflagged(problem));
+  const auto judged = unflagged(problem);
+  if (summary.free_poses == 0 || judged.empty()) return summary;
+
+  summary.cost_before = robust_cost(problem, judged, config);
+  internal::BundleSolver first(problem, config);
+  summary.iterations = first.run(config.first_iterations, stop);
+  gate(problem, judged, config);
+  if (!is_set(stop) && config.second_iterations > 0) {
+    internal::BundleSolver second(problem, config);
+    summary.iterations += second.run(config.second_iterations, stop);
+    gate(problem, judged, config);
+  }
+  summary.cost_after = robust_cost(problem, judged, config);
+  for (const auto& observation : problem.observations) {
+    if (observation.outlier) ++summary.outliers;
+    if (observation.depth_outlier) ++summary.depth_outliers;
+  }
+  summary.status =
+      is_set(stop) ? BundleSummary::Status::kInterrupted : BundleSummary::Status::kConverged;
+  return summary;
+}
+
+std::string BundleSummary::to_string(double time_s) const {
+  constexpr std::array kNames = {"converged", "interrupted", "nothing to do"};
+  std::array<char, 256> text{};
+  std::snprintf(text.data(),
+                text.size(),
+                "bundle adjustment %s: cost %.6g -> %.6g in %d iterations and %.1f ms; %zu+%zu "
+                "poses, %zu points, %zu observations, %zu outliers, %zu in depth",
+                kNames.at(static_cast<std::size_t>(status)),
+                cost_before,
+                cost_after,
+                iterations,
+                1e3 * time_s,
+                free_poses,
+                fixed_poses,
+                points,
+                observations,
+                outliers,
+                depth_outliers);
+  return text.data();
+}
+
+}  // namespace camvox::optimization
