@@ -1,0 +1,31 @@
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+namespace camvox::trajectory {
+
+/// One line of a chart.
+struct Series {
+  std::string name;   ///< In the legend; none when empty.
+  std::string color;  ///< Of CSS: "#1f77b4".
+  std::vector<std::array<double, 2>> points;
+};
+
+/// A chart of lines as a whole SVG, to be shown by a browser or put into a page.
+struct Chart {
+  std::string title;
+  std::string x_label;
+  std::string y_label;
+  std::vector<Series> series;
+  bool equal_scales = false;  ///< One metre is as long in x as in y: maps.
+  int width_px = 760;
+  int height_px = 420;
+};
+
+/// Draws `chart`. Points that are not finite leave gaps. Long lines are thinned to what can be
+/// seen.
+[[nodiscard]] std::string to_svg(const Chart& chart);
+
+}  // namespace camvox::trajectory
