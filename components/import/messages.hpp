@@ -11,6 +11,7 @@
 #include "camvox/interfaces/nav_msgs.hpp"
 #include "camvox/interfaces/sensor_msgs.hpp"
 #include "camvox/interfaces/tf2_msgs.hpp"
+#include "camvox/interfaces/topics.hpp"
 
 /// Standard messages as all importers fill them.
 namespace camvox::import {
@@ -23,7 +24,7 @@ inline constexpr const char* kCameraFrame = "camera_optical_frame";
 
 // Topics that topics.hpp has no name for: only recordings carry them.
 inline constexpr std::string_view kGroundTruthTopic = "/ground_truth/odometry";
-inline constexpr std::string_view kDepthTopic = "/camera/depth_registered/image_raw";
+inline constexpr std::string_view kDepthTopic = interfaces::topics::kRegisteredDepth;
 
 [[nodiscard]] std_msgs::msg::Header make_header(std::int64_t stamp_ns, const std::string& frame);
 

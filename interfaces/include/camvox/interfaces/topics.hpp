@@ -11,6 +11,7 @@ namespace camvox::interfaces::topics {
 inline constexpr std::string_view kImage = "/camera/image_raw";
 inline constexpr std::string_view kCompressedImage = "/camera/image_raw/compressed";
 inline constexpr std::string_view kCameraInfo = "/camera/camera_info";
+inline constexpr std::string_view kRegisteredDepth = "/camera/depth_registered/image_raw";
 inline constexpr std::string_view kLidar = "/livox/lidar";
 inline constexpr std::string_view kImu = "/livox/imu";
 inline constexpr std::string_view kGnss = "/gnss/fix";
