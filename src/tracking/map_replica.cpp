@@ -1,0 +1,102 @@
+#include "camvox/tracking/map_replica.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace camvox::tracking {
+
+bool MapReplica::apply(LocalMap map) {
+  const bool older = map.map_epoch < map_epoch_ || map.frame_id < frame_id_;
+  if (map.keyframes.empty() || older) return false;
+
+  std::vector<std::uint8_t> strikes(map.landmarks.size(), 0);
+  std::size_t old = 0;
+  for (std::size_t i = 0; i < map.landmarks.size(); ++i) {
+    while (old < landmarks_.size() && landmarks_[old].id < map.landmarks[i].id) ++old;
+    if (old == landmarks_.size()) break;
+    if (landmarks_[old].id == map.landmarks[i].id) strikes[i] = strikes_[old];
+  }
+  landmarks_ = std::move(map.landmarks);
+  strikes_ = std::move(strikes);
+  keyframes_ = std::move(map.keyframes);
+  map_epoch_ = map.map_epoch;
+  frame_id_ = map.frame_id;
+  next_keyframe_id_ = std::max(next_keyframe_id_, map.next_keyframe_id);
+
+  std::erase_if(pending_, [&](const Pending& own) { return own.frame_id <= map.frame_id; });
+  for (auto& own : pending_) {
+    move_with_parent(own);
+    append(own);
+  }
+  return true;
+}
+
+void MapReplica::move_with_parent(Pending& pending) const {
+  const auto T_map_parent = T_map_keyframe(pending.parent_id);
+  if (!T_map_parent) return;
+  const geometry::SE3 T_map_camera = *T_map_parent * pending.T_parent_camera;
+  const geometry::SE3 T_new_old = T_map_camera * pending.keyframe.T_map_camera.inverse();
+  for (auto& landmark : pending.landmarks) {
+    landmark.p_map = T_new_old * landmark.p_map;
+    landmark.f_map = (T_new_old.rotation() * landmark.f_map.cast<double>()).cast<float>();
+  }
+  pending.keyframe.T_map_camera = T_map_camera;
+}
+
+void MapReplica::append(const Pending& pending) {
+  keyframes_.push_back(pending.keyframe);
+  landmarks_.insert(landmarks_.end(), pending.landmarks.begin(), pending.landmarks.end());
+  strikes_.resize(landmarks_.size(), 0);
+}
+
+void MapReplica::add(const Keyframe& keyframe) {
+  Pending own;
+  own.keyframe = {keyframe.id, keyframe.T_map_camera};
+  own.frame_id = keyframe.frame_id;
+  own.parent_id = keyframe.parent_id;
+  own.T_parent_camera = keyframe.T_parent_camera;
+  for (std::size_t i = 0; i < keyframe.landmark_ids.size(); ++i) {
+    if (keyframe.landmark_ids[i] != landmark_id(keyframe.id, i)) continue;
+    if (auto landmark = landmark_from_depth(keyframe, i, camera_, scale_)) {
+      own.landmarks.push_back(*landmark);
+    }
+  }
+  append(own);
+  pending_.push_back(std::move(own));
+  next_keyframe_id_ = std::max(next_keyframe_id_, keyframe.id + 1);
+}
+
+void MapReplica::clear() { *this = MapReplica(camera_, scale_); }
+
+std::optional<std::size_t> MapReplica::find(LandmarkId id) const {
+  const auto found = std::lower_bound(
+      landmarks_.begin(), landmarks_.end(), id, [](const Landmark& landmark, LandmarkId wanted) {
+        return landmark.id < wanted;
+      });
+  if (found == landmarks_.end() || found->id != id) return std::nullopt;
+  return static_cast<std::size_t>(found - landmarks_.begin());
+}
+
+std::optional<geometry::SE3> MapReplica::T_map_keyframe(KeyframeId id) const {
+  const auto found = std::find_if(keyframes_.begin(), keyframes_.end(), [id](const auto& keyframe) {
+    return keyframe.id == id;
+  });
+  if (found == keyframes_.end()) return std::nullopt;
+  return found->T_map_camera;
+}
+
+void MapReplica::judge(std::size_t landmark, bool agreed) {
+  std::uint8_t& strikes = strikes_[landmark];
+  if (agreed) {
+    strikes = static_cast<std::uint8_t>(strikes > 0 ? strikes - 1 : 0);
+  } else {
+    strikes = static_cast<std::uint8_t>(std::min(strikes + kStrike, int{kStrikesToBan}));
+  }
+}
+
+int MapReplica::banned_count() const {
+  return static_cast<int>(std::count_if(
+      strikes_.begin(), strikes_.end(), [](auto strikes) { return strikes >= kStrikesToBan; }));
+}
+
+}  // namespace camvox::tracking
