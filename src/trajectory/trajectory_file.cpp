@@ -121,8 +121,9 @@ Result<Trajectory> read_tum(const std::filesystem::path& file) {
     const auto stamp_ns = stamp_of(columns[0]);
     const auto v = numbers(columns, 1);
     if (!stamp_ns || v.size() != 7) return error_at(file, line, "not a number");
-    if (!trajectory.empty() && *stamp_ns <= trajectory.back().stamp_ns) {
-      return error_at(file, line, "the stamp is not after the one before");
+    if (!trajectory.empty() && *stamp_ns == trajectory.back().stamp_ns) return {};
+    if (!trajectory.empty() && *stamp_ns < trajectory.back().stamp_ns) {
+      return error_at(file, line, "the stamp is before the one of the line before");
     }
     const Eigen::Quaterniond q(v[6], v[3], v[4], v[5]);
     if (std::abs(q.norm() - 1.0) > 1e-3) return error_at(file, line, "not a unit quaternion");

@@ -8,8 +8,9 @@
 namespace camvox::trajectory {
 
 /// Reads "stamp_s x y z qx qy qz qw" a line, as the TUM RGB-D tools write it; '#' begins a comment.
-/// Stamps keep their nanoseconds. The error names file and line: wrong number of columns, not a
-/// number, not a unit quaternion, stamps that do not grow.
+/// Stamps keep their nanoseconds. Of lines with one stamp (TUM's own files have such) the first
+/// counts. The error names file and line: wrong number of columns, not a number, not a unit
+/// quaternion, stamps that go back.
 [[nodiscard]] storage::Result<Trajectory> read_tum(const std::filesystem::path& file);
 
 /// Writes whole or not at all: into a file beside it, which then takes its name.
