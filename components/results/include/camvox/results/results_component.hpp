@@ -1,0 +1,55 @@
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "camvox/component/component.hpp"
+#include "camvox/interfaces/camvox_interfaces.hpp"
+#include "camvox/sensors/rig.hpp"
+#include "camvox/trajectory/keyframe_path.hpp"
+
+namespace camvox {
+
+/// Parameters of ResultsComponent.
+struct ResultsConfig {
+  std::string output_dir;  ///< Folder to write to; "" writes nothing.
+  sensors::RigConfig rig;
+
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& field) {
+    field("output_dir", self.output_dir);
+    field("rig", self.rig);
+  }
+};
+
+/// Follows a run and writes at its end, all poses as TUM files of the body in the map:
+///
+/// | file | content |
+/// | --- | --- |
+/// | trajectory.tum | every frame that was tracked, as the finished map has it |
+/// | odometry.tum | the same as tracking said it at the time |
+/// | keyframes.tum | the keyframes of the finished map |
+/// | frames.csv | state, features, matches and time of every frame |
+/// | timing.csv | processor time a frame of every component: median, mean, p95, p99, maximum |
+class ResultsComponent final : public Component {
+ public:
+  explicit ResultsComponent(Context& context);
+  void stop() override;
+
+ private:
+  void add_pose(const camvox_interfaces::msg::FramePose& pose);
+  void add_update(const camvox_interfaces::msg::MapUpdate& update);
+  void save_trajectory(const char* name, trajectory::Trajectory of_camera);
+  void save_text(const char* name, const std::string& text);
+
+  Context& context_;
+  ResultsConfig config_;
+  geometry::SE3 T_camera_body_;
+  trajectory::KeyframePath path_;
+  trajectory::Trajectory odometry_;
+  std::string frames_csv_;
+  std::map<std::string, std::vector<double>> times_s_;  // by component
+};
+
+}  // namespace camvox

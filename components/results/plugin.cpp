@@ -1,0 +1,3 @@
+#include "camvox/results/results_component.hpp"
+
+CAMVOX_REGISTER_COMPONENT(camvox::ResultsComponent)

@@ -1,0 +1,142 @@
+#include "camvox/results/results_component.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <stdexcept>
+
+#include "camvox/conversion/pose.hpp"
+#include "camvox/trajectory/trajectory_file.hpp"
+
+namespace camvox {
+namespace {
+
+using camvox_interfaces::msg::FramePose;
+using camvox_interfaces::msg::Keyframe;
+using camvox_interfaces::msg::MapUpdate;
+using camvox_interfaces::msg::Progress;
+
+constexpr std::array kStates = {"waiting", "ok", "lost", "relocalising", "localisation_only"};
+
+/// Every message counts here, however late this component is.
+constexpr SubscribeOptions kAll{.qos = {1024, true, false}, .required = false};
+
+double percentile(const std::vector<double>& sorted, double share) {
+  const auto index = share * static_cast<double>(sorted.size() - 1);
+  return sorted[static_cast<std::size_t>(index + 0.5)];
+}
+
+std::string timing_csv(const std::map<std::string, std::vector<double>>& times_s) {
+  std::string text = "component,frames,median_ms,mean_ms,p95_ms,p99_ms,max_ms\n";
+  for (const auto& [name, times] : times_s) {
+    auto sorted = times;
+    std::sort(sorted.begin(), sorted.end());
+    double sum_s = 0.0;
+    for (const double time_s : sorted) sum_s += time_s;
+    text += fmt::format("{},{},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f}\n",
+                        name,
+                        sorted.size(),
+                        1e3 * percentile(sorted, 0.5),
+                        1e3 * sum_s / static_cast<double>(sorted.size()),
+                        1e3 * percentile(sorted, 0.95),
+                        1e3 * percentile(sorted, 0.99),
+                        1e3 * sorted.back());
+  }
+  return text;
+}
+
+}  // namespace
+
+ResultsComponent::ResultsComponent(Context& context)
+    : context_(context),
+      config_(context.parameters<ResultsConfig>()),
+      T_camera_body_(sensors::make_rig_calibration(config_.rig).T_body_camera.inverse()) {
+  frames_csv_ =
+      "frame_id,stamp_ns,state,keyframe_id,map_epoch,features,with_depth,matches,inliers,"
+      "time_ms\n";
+  context.subscribe<FramePose>({"frame_pose", topics::kFramePose},
+                               [this](const auto& pose) { add_pose(*pose); },
+                               {.qos = kAll.qos, .required = true});
+  context.subscribe<Keyframe>({"keyframe", topics::kKeyframe},
+                              [this](const auto& keyframe) {
+                                path_.add_keyframe(keyframe->id(),
+                                                   keyframe->header().stamp_ns(),
+                                                   conversion::to_se3(keyframe->T_map_camera()));
+                              },
+                              {.qos = qos::kKeyframes, .required = false});
+  context.subscribe<MapUpdate>({"map_update", topics::kMapUpdate},
+                               [this](const auto& update) { add_update(*update); },
+                               {.qos = qos::kKeyframes, .required = false});
+  context.subscribe<Progress>(
+      {"progress", topics::kProgress},
+      [this](const auto& progress) {
+        const auto& name = progress->component_name();
+        times_s_[{name.data(), strnlen(name.data(), name.size())}].push_back(
+            progress->processing_time_s());
+      },
+      kAll);
+}
+
+void ResultsComponent::add_pose(const FramePose& pose) {
+  const auto state = std::min<std::size_t>(pose.state(), kStates.size() - 1);
+  frames_csv_ += fmt::format("{},{},{},{},{},{},{},{},{},{:.3f}\n",
+                             pose.header().frame_id(),
+                             pose.header().stamp_ns(),
+                             kStates[state],
+                             pose.reference_keyframe_id(),
+                             pose.map_epoch(),
+                             pose.features(),
+                             pose.features_with_depth(),
+                             pose.matches(),
+                             pose.inliers(),
+                             1e3F * pose.processing_time_s());
+  const bool tracked = pose.state() == camvox_interfaces::msg::TRACKING_OK ||
+                       pose.state() == camvox_interfaces::msg::TRACKING_LOCALISATION_ONLY;
+  if (!tracked) return;
+  const auto stamp_ns = pose.header().stamp_ns();
+  path_.add_frame(
+      {stamp_ns, pose.reference_keyframe_id(), conversion::to_se3(pose.T_keyframe_camera())});
+  odometry_.push_back({stamp_ns, conversion::to_se3(pose.T_map_camera())});
+}
+
+void ResultsComponent::add_update(const MapUpdate& update) {
+  for (std::uint32_t i = 0; i < update.keyframe_ids_count(); ++i) {
+    path_.move_keyframe(update.keyframe_ids()[i], conversion::to_se3(update.keyframe_poses()[i]));
+  }
+  for (std::uint32_t i = 0; i < update.removed_keyframe_ids_count(); ++i) {
+    path_.remove_keyframe(update.removed_keyframe_ids()[i]);
+  }
+}
+
+void ResultsComponent::stop() {
+  if (config_.output_dir.empty()) return;
+  save_trajectory("trajectory.tum", path_.frames());
+  save_trajectory("odometry.tum", odometry_);
+  save_trajectory("keyframes.tum", path_.keyframes());
+  save_text("frames.csv", frames_csv_);
+  save_text("timing.csv", timing_csv(times_s_));
+  context_.log().info("{} of {} frames tracked; results in {}",
+                      odometry_.size(),
+                      std::count(frames_csv_.begin(), frames_csv_.end(), '\n') - 1,
+                      config_.output_dir);
+}
+
+void ResultsComponent::save_trajectory(const char* name, trajectory::Trajectory of_camera) {
+  for (auto& pose : of_camera) pose.T_world_body = pose.T_world_body * T_camera_body_;
+  const auto status =
+      trajectory::write_tum(std::filesystem::path(config_.output_dir) / name, of_camera);
+  if (!status.ok()) context_.log().error("{}", status.message());
+}
+
+void ResultsComponent::save_text(const char* name, const std::string& text) {
+  const auto file = std::filesystem::path(config_.output_dir) / name;
+  std::ofstream stream(file, std::ios::trunc);
+  if (!(stream << text << std::flush)) {
+    context_.log().error("{}: cannot be written", file.string());
+  }
+}
+
+}  // namespace camvox
