@@ -16,7 +16,7 @@ struct StationaryConfig {
   double max_gyro_mean_rad_s = 0.05;   ///< Its mean: above the largest bias to be expected.
   double max_force_sigma_m_s2 = 0.15;  ///< Spread of the specific force per axis.
   double max_block_change = 4.0;       ///< Change of a block's mean brightness, grey levels.
-  double max_changed_blocks = 0.04;    ///< Part of the blocks that may change (people walk by).
+  double max_changed_blocks = 0.1;     ///< Part of the blocks that may change (people walk by).
   int min_still_frames = 3;            ///< Frames in a row before the rig counts as still.
 
   template <typename Self, typename Visitor>
