@@ -1,0 +1,144 @@
+#include "evaluation.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "camvox/trajectory/alignment.hpp"
+#include "command.hpp"
+#include "trajectory_source.hpp"
+
+namespace camvox::command {
+namespace {
+
+using trajectory::Statistics;
+
+constexpr double kDegrees = 180.0 / M_PI;
+
+std::vector<double> scaled(std::vector<double> values, double factor) {
+  for (double& value : values) value *= factor;
+  return values;
+}
+
+void add_relative(const EvaluationOptions& options, Evaluation& result) {
+  const auto errors = options.delta_unit == "m"
+                          ? trajectory::relative_errors_by_path(result.aligned, options.delta)
+                          : trajectory::relative_errors_by_frames(
+                                result.aligned, static_cast<std::size_t>(options.delta));
+  std::vector<double> translation_m;
+  std::vector<double> rotation_deg;
+  for (const auto& error : errors) {
+    translation_m.push_back(error.translation_m);
+    rotation_deg.push_back(kDegrees * error.rotation_rad);
+  }
+  result.rpe_m = trajectory::statistics(translation_m);
+  result.rpe_deg = trajectory::statistics(rotation_deg);
+}
+
+std::string row(const std::string& name, const Statistics& s) {
+  return fmt::format(
+      "| {:<18} | {:>9.4f} | {:>9.4f} | {:>9.4f} | {:>9.4f} | {:>9.4f} | {:>11.4f} | "
+      "{:>9.4f} |\n",
+      name,
+      s.max,
+      s.mean,
+      s.median,
+      s.min,
+      s.rmse,
+      s.sse,
+      s.std);
+}
+
+}  // namespace
+
+Evaluation evaluate(const EvaluationOptions& options) {
+  const auto reference = load_trajectory(options.reference, options.reference_topic);
+  const auto estimate = load_trajectory(options.estimate, options.estimate_topic);
+  Evaluation result;
+  result.estimated = estimate.size();
+  result.pairs =
+      trajectory::associate(reference,
+                            estimate,
+                            static_cast<std::int64_t>(options.max_difference_s * 1e9),
+                            static_cast<std::int64_t>(std::llround(options.offset_s * 1e9)));
+  if (result.pairs.empty()) {
+    throw CommandError(fmt::format(
+        "no pose of {} ({} poses) is within {} s of one of {} ({} poses); see --offset and "
+        "--max-difference",
+        options.estimate,
+        estimate.size(),
+        options.max_difference_s,
+        options.reference,
+        reference.size()));
+  }
+  const auto alignment = *trajectory::parse_alignment(options.alignment);
+  const auto similarity = trajectory::align(result.pairs, alignment);
+  if (!similarity) {
+    throw CommandError(fmt::format(
+        "the {} pairs of poses do not determine an alignment: fewer than three, or on one line "
+        "(--align origin takes the first pose)",
+        result.pairs.size()));
+  }
+  result.aligned = trajectory::transformed(*similarity, result.pairs);
+  trajectory::Trajectory driven;
+  for (const auto& pair : result.pairs) driven.push_back(pair.reference);
+  result.length_m = trajectory::path_length_m(driven);
+  if (const auto sim3 = trajectory::align(result.pairs, trajectory::Alignment::kSim3)) {
+    result.scale = sim3->scale;
+  }
+  result.ape_m = trajectory::statistics(trajectory::absolute_errors_m(result.aligned));
+  result.ape_deg =
+      trajectory::statistics(scaled(trajectory::absolute_errors_rad(result.aligned), kDegrees));
+  add_relative(options, result);
+  result.kitti = trajectory::kitti_errors(result.aligned);
+  return result;
+}
+
+std::string to_markdown(const EvaluationOptions& options, const Evaluation& result) {
+  std::string text = fmt::format(
+      "{} of {} poses paired, path {:.2f} m, alignment {}{}\n\n",
+      result.pairs.size(),
+      result.estimated,
+      result.length_m,
+      options.alignment,
+      result.scale ? fmt::format(", scale error {:+.3f} %", 100.0 * (1.0 / *result.scale - 1.0))
+                   : "");
+  text += fmt::format("| {:<18} | {:>9} | {:>9} | {:>9} | {:>9} | {:>9} | {:>11} | {:>9} |\n",
+                      "",
+                      "max",
+                      "mean",
+                      "median",
+                      "min",
+                      "rmse",
+                      "sse",
+                      "std");
+  text +=
+      fmt::format("| {:-<18} | {:->9} | {:->9} | {:->9} | {:->9} | {:->9} | {:->11} | {:->9} |\n",
+                  "",
+                  "",
+                  "",
+                  "",
+                  "",
+                  "",
+                  "",
+                  "");
+  text += row("APE (m)", result.ape_m);
+  text += row("APE rotation (deg)", result.ape_deg);
+  const auto delta = fmt::format("{:g} {}", options.delta, options.delta_unit);
+  if (result.rpe_m.count > 0) {
+    text += row(fmt::format("RPE {} (m)", delta), result.rpe_m);
+    text += row(fmt::format("RPE {} (deg)", delta), result.rpe_deg);
+  } else {
+    text += fmt::format("\nno RPE: the path is shorter than twice {}\n", delta);
+  }
+  if (result.kitti) {
+    text += fmt::format(
+        "\nKITTI: t_rel {:.3f} %, r_rel {:.4f} deg/100 m over {} stretches of 100 to 800 m\n",
+        result.kitti->t_rel_percent,
+        result.kitti->r_rel_deg_per_100m,
+        result.kitti->stretches);
+  }
+  return text;
+}
+
+}  // namespace camvox::command
