@@ -1,5 +1,6 @@
 #include "camvox/recording/replay_component.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <cstring>
 #include <map>
@@ -11,6 +12,7 @@ namespace camvox {
 namespace {
 
 constexpr std::int64_t kSecond_ns = 1'000'000'000;
+constexpr int kQueuedMessages = 4096;
 
 std::string remapped(const std::string& topic, const std::vector<std::string>& rules) {
   for (const auto& rule : rules) {
@@ -115,7 +117,10 @@ void ReplayComponent::start() {
 void ReplayComponent::advertise_topics(const storage::BagReader& bag) {
   for (const auto& topic : bag.topics()) {
     const std::string name = remapped(topic.name, config_.remap);
-    const PublishOptions options{.qos = recorded_qos(topic.offered_qos_profiles), .max_loans = 2};
+    PublishOptions options{.qos = recorded_qos(topic.offered_qos_profiles), .max_loans = 2};
+    // Messages leave on another thread, and 200 IMU samples may be handed over at once: a writer's
+    // history of 5 or 10 would lose most of them. Of a latched topic the depth means something.
+    if (!options.qos.latched) options.qos.depth = std::max(options.qos.depth, kQueuedMessages);
     publishers_.push_back(context_.advertise_raw({topic.name, name}, topic.type, options));
     const bool frames = topic.name == config_.lockstep_topic ||
                         topic.name == config_.lockstep_topic + "/compressed";
