@@ -3,6 +3,9 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
 
 namespace camvox::import {
 
@@ -10,11 +13,16 @@ namespace fs = std::filesystem;
 using storage::StatusCode;
 
 ImportJob::ImportJob(const ImportOptions& options, const std::string& default_name)
-    : progress_(options.progress) {
+    : progress_(options.progress), replace_(options.replace) {
   fs::path bag = options.output.empty() ? fs::path(default_name) : options.output;
   if (!bag.has_filename()) bag = bag.parent_path();  // "name/" means "name"
   if (fs::exists(fs::symlink_status(bag))) {
-    throw ImportError(StatusCode::kInvalid, bag.string() + " exists; choose another output");
+    if (!replace_) {
+      throw ImportError(StatusCode::kInvalid, bag.string() + " exists; choose another output");
+    }
+    if (!fs::exists(bag / "metadata.yaml")) {
+      throw ImportError(StatusCode::kInvalid, bag.string() + " is no bag; it is not replaced");
+    }
   }
   report.bag = bag;
   workshop_ = bag;
@@ -47,12 +55,27 @@ ImportReport ImportJob::finish() {
   }
   require(writer_->close());
   writer_.reset();
-  // Rename replaces an empty folder: one that came meanwhile must not be taken for ours.
-  if (fs::exists(fs::symlink_status(report.bag))) {
-    throw ImportError(StatusCode::kInvalid, report.bag.string() + " exists by now");
-  }
+  make_way();
   fs::rename(workshop_ / report.bag.filename(), report.bag);
   return std::move(report);
+}
+
+void ImportJob::make_way() const {
+  if (!fs::exists(fs::symlink_status(report.bag))) return;
+  // Rename replaces an empty folder: one that came meanwhile must not be taken for ours.
+  if (!replace_) throw ImportError(StatusCode::kInvalid, report.bag.string() + " exists by now");
+  fs::rename(report.bag, workshop_ / "replaced");  // goes away with the workshop
+}
+
+void ImportJob::write_file(const std::string& name, const std::string& text) const {
+  const auto path = workshop_ / report.bag.filename() / name;
+  errno = 0;
+  std::ofstream stream(path, std::ios::binary);
+  stream << text;
+  stream.close();
+  if (!stream) {
+    throw ImportError(StatusCode::kIo, path.string() + ": write failed: " + std::strerror(errno));
+  }
 }
 
 std::string name_from(const fs::path& input, const std::string& extension) {

@@ -24,6 +24,8 @@ class ImportJob {
     require(writer_->write(std::string(topic), log_time_ns, message));
   }
   [[nodiscard]] MessageBagWriter& writer() { return *writer_; }
+  /// Puts a file beside those of the bag.
+  void write_file(const std::string& name, const std::string& text) const;
 
   /// Tells the caller; throws when it wants to stop.
   void progress(std::uint64_t done, std::uint64_t total);
@@ -34,7 +36,10 @@ class ImportJob {
   ImportReport report;
 
  private:
+  void make_way() const;
+
   std::function<bool(const ImportProgress&)> progress_;
+  bool replace_;
   std::filesystem::path workshop_;  ///< Holds the bag under its final name while it grows.
   std::unique_ptr<MessageBagWriter> writer_;
 };

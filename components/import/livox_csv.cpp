@@ -18,7 +18,6 @@ namespace fs = std::filesystem;
 using livox_ros_driver2::msg::CustomMsg;
 using livox_ros_driver2::msg::CustomPoint;
 
-constexpr const char* kLidarFrame = "livox_frame";
 constexpr double kMaxRange_m = 2000.0;  // no Livox lidar sees farther: the numbers are no metres
 
 /// Where a column is in a row.
@@ -151,7 +150,7 @@ class LivoxCsvImport {
     const auto stamp_ns = options_.start_ns + timebase_ns_;
     const auto end_ns = stamp_ns + points_.back().offset_time();
     CustomMsg message;
-    message.header(make_header(stamp_ns, kLidarFrame));
+    message.header(make_header(stamp_ns, kLivoxFrame));
     message.timebase(static_cast<std::uint64_t>(stamp_ns));
     message.point_num(static_cast<std::uint32_t>(points_.size()));
     message.points(std::move(points_));

@@ -21,6 +21,7 @@ inline constexpr const char* kMapFrame = "map";
 inline constexpr const char* kBaseFrame = "base_link";
 inline constexpr const char* kImuFrame = "imu_link";
 inline constexpr const char* kCameraFrame = "camera_optical_frame";
+inline constexpr const char* kLivoxFrame = "livox_frame";  // as livox_ros_driver2 names it
 
 // Topics that topics.hpp has no name for: only recordings carry them.
 inline constexpr std::string_view kGroundTruthTopic = "/ground_truth/odometry";

@@ -71,4 +71,26 @@ std::string_view type_name(const Value& value) {
 
 std::string to_yaml(const Value& value) { return std::visit(YamlWriter{}, value); }
 
+std::string to_yaml(const ParameterMap& parameters) {
+  std::string text;
+  std::string open;  ///< Path of the maps that the last line stands in, with a dot at its end.
+  for (const auto& [key, parameter] : parameters) {
+    // Sorted keys: those of one map follow each other.
+    std::size_t begin = 0;
+    std::string indent;
+    for (auto dot = key.find('.'); dot != std::string::npos; dot = key.find('.', begin)) {
+      const std::string path = key.substr(0, dot + 1);
+      if (!open.starts_with(path)) {
+        text += indent + key.substr(begin, dot - begin) + ":\n";
+        open = path;
+      }
+      begin = dot + 1;
+      indent += "  ";
+    }
+    open = key.substr(0, begin);
+    text += indent + key.substr(begin) + ": " + to_yaml(parameter.value) + "\n";
+  }
+  return text;
+}
+
 }  // namespace camvox::config

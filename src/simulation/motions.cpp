@@ -93,9 +93,9 @@ Route campus_1800m(const Vector2d& block) {
 }
 
 Route plaza_loop() {
-  Route route{{-18.0, -12.0}, 0.0, {}};
+  Route route{{-14.5, -10.5}, 0.0, {}};
   const std::vector<Vector2d> loop = {
-      {18.0, -12.0}, {18.0, 10.0}, {-18.0, 10.0}, {-18.0, -12.0}, {-8.0, -12.0}};
+      {14.5, -10.5}, {14.5, 8.5}, {-14.5, 8.5}, {-14.5, -10.5}, {-7.0, -10.5}};
   route.legs.push_back(Pause{2.0});
   route.legs.push_back(Drive{{loop.begin(), loop.begin() + 2}, 3.0});
   route.legs.push_back(Pause{1.0});

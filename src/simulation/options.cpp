@@ -68,7 +68,11 @@ SimulationOptions preset(const std::string& name) {
   options.world.people = 8;
   options.world.kind = "plaza";
   if (name == "demo") {
+    // At most 150 MB: a Horizon's points alone would be 200 MB, so this lidar fires 83 000 a
+    // second.
     options.motion = "plaza_loop";
+    options.lidar.point_interval_ns = 12'000;
+    options.camera.jpeg_quality = 60;
   } else if (name == "standstill") {
     options.motion = name;
     options.world.people = 4;

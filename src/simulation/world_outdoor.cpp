@@ -269,7 +269,7 @@ Circuits walks_of(const World& world) {
   if (world.kind == "plaza") {
     return {rectangle(-30, -17.5f, 30, 17.5f),
             rectangle(-26, 16.0f, 27, 19.0f),
-            rectangle(14, -16, 29, 15)};
+            rectangle(18, -16, 29, 15)};
   }
   if (world.kind == "street")
     return {rectangle(-90, 6.6f, 90, 7.1f), rectangle(-90, -7.1f, 90, -6.6f)};

@@ -47,7 +47,7 @@ FileSink::~FileSink() {
 
 Status FileSink::failed(const char* action, int error) const {
   std::string message = path_.string() + ": " + action + " failed: " + std::strerror(error);
-  if (error == ENOSPC) message += "; free some space, what was written so far can be recovered";
+  if (error == ENOSPC) message += "; free some space";
   return {StatusCode::kIo, message};
 }
 

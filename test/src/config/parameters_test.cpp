@@ -124,5 +124,17 @@ TEST(NearestName, IsSilentWhenNothingIsNear) {
   EXPECT_EQ(nearest_name("zzzz", {"max_range_m", "mode"}), "");
 }
 
+TEST(ParameterText, NestsDottedKeys) {
+  const auto at = [](Value value) { return Parameter{std::move(value), {}}; };
+  const ParameterMap parameters = {{"a.b.c", at(std::int64_t{1})},
+                                   {"a.b.d", at(2.0)},
+                                   {"a.c", at(true)},
+                                   {"a.d.e", at(std::string("x"))},
+                                   {"b", at(std::vector<double>{1.0, 2.5})}};
+  EXPECT_EQ(to_yaml(parameters),
+            "a:\n  b:\n    c: 1\n    d: 2.0\n  c: true\n  d:\n    e: \"x\"\nb: [1.0, 2.5]\n");
+  EXPECT_EQ(to_yaml(ParameterMap{}), "");
+}
+
 }  // namespace
 }  // namespace camvox::config

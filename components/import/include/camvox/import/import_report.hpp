@@ -22,6 +22,7 @@ struct ImportOptions {
   /// folder.
   std::filesystem::path output;
   storage::BagWriterOptions bag;
+  bool replace = false;  ///< A bag that stands at `output` makes way, once the new one is whole.
   /// Called from time to time; the import ends with an error when it returns false.
   std::function<bool(const ImportProgress&)> progress;
 };

@@ -44,6 +44,9 @@ using ParameterMap = std::map<std::string, Parameter, std::less<>>;
 /// The value as YAML flow text that reads back as the same type (a double keeps its point).
 [[nodiscard]] std::string to_yaml(const Value& value);
 
+/// Parameters as YAML text of nested maps, a line each, sorted by key: what a config file holds.
+[[nodiscard]] std::string to_yaml(const ParameterMap& parameters);
+
 template <typename T>
 inline constexpr bool kIsVector = false;
 template <typename T>

@@ -23,6 +23,7 @@ struct CameraOptions {
   double gain_variation = 0.03;  ///< Slow relative change of the gain, one sigma.
   double shot_noise = 1.0;       ///< Noise at full brightness, in grey levels of 255.
   double read_noise = 0.8;       ///< Noise in the dark, in grey levels of 255.
+  int jpeg_quality = 85;         ///< Of images that are sent compressed, 1 to 100.
 
   template <typename Self, typename Visitor>
   static void visit(Self& self, Visitor&& field) {
@@ -33,6 +34,7 @@ struct CameraOptions {
     field("gain_variation", self.gain_variation, config::at_least(0.0), config::at_most(0.5));
     field("shot_noise", self.shot_noise, config::at_least(0.0), config::at_most(50.0));
     field("read_noise", self.read_noise, config::at_least(0.0), config::at_most(50.0));
+    field("jpeg_quality", self.jpeg_quality, config::at_least(1), config::at_most(100));
   }
 };
 
