@@ -22,9 +22,12 @@ std::optional<CameraStep> OdometrySteps::add(const FramePose& pose) {
                   conversion::to_se3(pose.T_map_camera()),
                   conversion::to_se3(pose.T_keyframe_camera())};
   const auto previous = last_;
-  if (previous && next.stamp_ns <= previous->stamp_ns) return std::nullopt;
+  // A little older: out of order. Much older: the clock was set back, so begin again.
+  constexpr std::int64_t kClockJump_ns = 1'000'000'000;
+  const bool older = previous && next.stamp_ns <= previous->stamp_ns;
+  if (older && next.stamp_ns > previous->stamp_ns - kClockJump_ns) return std::nullopt;
   last_ = next;
-  if (!previous) return std::nullopt;
+  if (!previous || older) return std::nullopt;
   CameraStep step{previous->stamp_ns, next.stamp_ns, {}};
   if (previous->keyframe_id == next.keyframe_id) {
     step.T_from_to = previous->T_keyframe_camera.inverse() * next.T_keyframe_camera;

@@ -76,6 +76,9 @@ SyncComponent::SyncComponent(Context& context)
   context.every(std::chrono::milliseconds(20), [this] { publish_ready(); });
   context.every(std::chrono::seconds(1), [this] {
     report_.write(context_.diagnostics(), assembler_, force_unit_.implausible());
+    if (!has_lidar()) {
+      report_.write_stream(context_.diagnostics(), "depth", depth_pairing_.counters());
+    }
   });
 }
 
@@ -266,9 +269,12 @@ void SyncComponent::write_scan(const sync::Frame& frame, Scan& scan, const Frame
   auto blocks = lidar::block_means(
       image.data().data(), image.row_step_bytes(), image.height_px(), image.row_step_bytes());
   scan.stationary(stationary_.add(std::move(blocks), {scan.imu().data(), imu_count}) ? 1 : 0);
-  if (const auto nearest_ns = assembler_.lidar().nearest_stamp_ns(frame.stamp_ns)) {
-    report_.frame_made(seconds(frame.stamp_ns - *nearest_ns));
+  // Of the image before: the message that begins with this one is not there yet.
+  if (previous_image_ns_) {
+    const auto nearest_ns = assembler_.lidar().nearest_stamp_ns(*previous_image_ns_);
+    if (nearest_ns) report_.frame_made(seconds(*previous_image_ns_ - *nearest_ns));
   }
+  previous_image_ns_ = frame.stamp_ns;
 }
 
 void SyncComponent::publish_depth(const sync::Frame& frame) {

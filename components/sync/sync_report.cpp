@@ -8,19 +8,6 @@
 namespace camvox::sync_component {
 namespace {
 
-void write_stream(Diagnostics& diagnostics,
-                  const std::string& name,
-                  const sync::StreamCounters& counters) {
-  diagnostics.set(name + ".received", counters.received);
-  diagnostics.set(name + ".used", counters.used);
-  diagnostics.set(name + ".duplicates", counters.duplicates);
-  diagnostics.set(name + ".reordered", counters.reordered);
-  diagnostics.set(name + ".late", counters.late);
-  diagnostics.set(name + ".suspects", counters.suspects);
-  diagnostics.set(name + ".clock_jumps", counters.clock_jumps);
-  diagnostics.set(name + ".malformed", counters.malformed);
-}
-
 void write_estimate(Diagnostics& diagnostics,
                     const std::string& name,
                     const sync::OffsetEstimator& estimator) {
@@ -37,6 +24,19 @@ double clock_difference_s(const std::optional<std::int64_t>& sensor_ns,
 }
 
 }  // namespace
+
+void SyncReport::write_stream(Diagnostics& diagnostics,
+                              const std::string& name,
+                              const sync::StreamCounters& counters) {
+  diagnostics.set(name + ".received", counters.received);
+  diagnostics.set(name + ".used", counters.used);
+  diagnostics.set(name + ".duplicates", counters.duplicates);
+  diagnostics.set(name + ".reordered", counters.reordered);
+  diagnostics.set(name + ".late", counters.late);
+  diagnostics.set(name + ".suspects", counters.suspects);
+  diagnostics.set(name + ".clock_jumps", counters.clock_jumps);
+  diagnostics.set(name + ".malformed", counters.malformed);
+}
 
 SyncReport::Health SyncReport::judge(sync::FrameAssembler& assembler, bool force_implausible) {
   const auto& frames = assembler.frame_counters();

@@ -15,6 +15,9 @@ std::int64_t nanoseconds(double time_s) { return std::llround(1e9 * time_s); }
 double square(double value) { return value * value; }
 
 constexpr std::int64_t kKeep_ns = 3'000'000'000;  // of readings behind the newest odometry
+constexpr std::int64_t kLongest_ns =
+    12'000'000'000;  // of readings in all: bias_interval_s and more
+constexpr std::int64_t kClockJump_ns = 1'000'000'000;
 
 }  // namespace
 
@@ -24,6 +27,16 @@ InertialMotionFilter::InertialMotionFilter(const MotionFilterConfig& config)
 }
 
 double InertialMotionFilter::gyro_bias_sigma_rad_s() const { return std::sqrt(bias_variance_); }
+
+void InertialMotionFilter::add_reading(const ImuReading& reading) {
+  if (track_.newest_ns() && reading.stamp_ns < *track_.newest_ns() - kClockJump_ns) {
+    track_.clear();
+    known_ = false;
+    turn_to_ns_ = -1;
+  }
+  track_.add(reading);
+  track_.forget_before(reading.stamp_ns - kLongest_ns);
+}
 
 void InertialMotionFilter::add_standstill(std::int64_t begin_ns, std::int64_t end_ns) {
   if (end_ns <= begin_ns || !track_.covers(begin_ns, end_ns, nanoseconds(config_.max_imu_gap_s))) {
@@ -64,7 +77,7 @@ void InertialMotionFilter::add_odometry(const OdometryStep& step) {
   p_imu_.setZero();
   covariance_.topRows<3>().setZero();
   covariance_.leftCols<3>().setZero();
-  track_.forget_before(step.to_ns - kKeep_ns);
+  track_.forget_before(std::min(turn_from_ns_, step.to_ns - kKeep_ns));
 }
 
 /// Mean velocity of the step; gravity against the mean force, as if not accelerated.

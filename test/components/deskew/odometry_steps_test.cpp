@@ -58,5 +58,13 @@ TEST(OdometrySteps, NoStepThroughALostFrameOrBackInTime) {
   EXPECT_TRUE(steps.add(pose_at(400, 0.0, 0.0)));
 }
 
+TEST(OdometrySteps, FollowsAClockThatWasSetBack) {
+  constexpr std::int64_t kSecond_ns = 1'000'000'000;
+  OdometrySteps steps;
+  EXPECT_FALSE(steps.add(pose_at(100 * kSecond_ns, 0.0, 0.0)));
+  EXPECT_FALSE(steps.add(pose_at(10 * kSecond_ns, 0.0, 0.0)));
+  EXPECT_TRUE(steps.add(pose_at(10 * kSecond_ns + 100, 0.0, 0.0)));
+}
+
 }  // namespace
 }  // namespace camvox::deskew_component

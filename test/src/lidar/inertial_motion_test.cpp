@@ -34,10 +34,12 @@ struct Errors {
 /// Runs the filter for 20 s; mean errors of the velocity predicted one frame ahead, second half.
 Errors run(const test::MovingRig& rig, double sigma_m, double sigma_rad) {
   InertialMotionFilter filter({});
-  for (const auto& reading : rig.imu(0, 20'200 * kMs, {}, 3)) filter.add_reading(reading);
+  const auto readings = rig.imu(0, 20'200 * kMs, {}, 3);
+  auto next = readings.begin();
   Errors errors;
   int count = 0;
   for (std::int64_t time_ns = kFrame_ns; time_ns < 20'000 * kMs; time_ns += kFrame_ns) {
+    for (; next->stamp_ns <= time_ns + kFrame_ns; ++next) filter.add_reading(*next);
     const auto T_step = step_of(rig, time_ns, sigma_m, sigma_rad);
     filter.add_odometry({time_ns - kFrame_ns, time_ns, T_step});
     const auto motion = filter.predict(time_ns + kFrame_ns);
@@ -108,6 +110,21 @@ TEST(InertialMotionFilter, StartsAnewAfterAJumpOfOdometry) {
   const auto motion = filter.predict(4'100 * kMs);
   ASSERT_TRUE(motion);
   EXPECT_LT((motion->v_imu - true_velocity_imu(rig, 4'100 * kMs)).norm(), 0.1);
+}
+
+TEST(InertialMotionFilter, FollowsAClockThatWasSetBack) {
+  const auto rig = test::MovingRig::driving(4.0);
+  InertialMotionFilter filter({});
+  for (std::int64_t ms = 90'000; ms < 91'000; ms += 5) filter.add_reading({ms * kMs, {}, {}});
+  for (const auto& reading : rig.imu(0, 2'000 * kMs, {})) filter.add_reading(reading);
+  filter.add_odometry({0, kFrame_ns, step_of(rig, kFrame_ns, 0, 0)});
+  EXPECT_TRUE(filter.predict(2 * kFrame_ns));
+}
+
+TEST(InertialMotionFilter, MemoryIsBoundedWithoutOdometry) {
+  InertialMotionFilter filter({});
+  for (std::int64_t ms = 0; ms < 100'000; ms += 5) filter.add_reading({ms * kMs, {}, {}});
+  EXPECT_LE(filter.track().size(), 2500U);
 }
 
 TEST(InertialMotionFilter, IsRepeatable) {

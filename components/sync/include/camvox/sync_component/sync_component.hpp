@@ -105,6 +105,7 @@ class SyncComponent final : public Component {
   Publisher<DepthImage> depth_images_;
   std::deque<Loan<FrameImage>> images_;  // of the pending frames
   std::uint64_t next_frame_id_ = 1;
+  std::optional<std::int64_t> previous_image_ns_;
 };
 
 }  // namespace camvox

@@ -27,6 +27,10 @@ class SyncReport {
 
   /// Writes everything, and the health that follows from it.
   void write(Diagnostics& diagnostics, sync::FrameAssembler& assembler, bool force_implausible);
+  /// Writes the counters of one more stream.
+  static void write_stream(Diagnostics& diagnostics,
+                           const std::string& name,
+                           const sync::StreamCounters& counters);
 
  private:
   struct Health {

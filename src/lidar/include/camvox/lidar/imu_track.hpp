@@ -34,6 +34,11 @@ class ImuTrack {
   void clear() { readings_.clear(); }
 
   [[nodiscard]] bool empty() const { return readings_.empty(); }
+  [[nodiscard]] std::size_t size() const { return readings_.size(); }
+  /// The latest stamp; nothing when there are no readings.
+  [[nodiscard]] std::optional<std::int64_t> newest_ns() const {
+    return readings_.empty() ? std::nullopt : std::optional(readings_.back().stamp_ns);
+  }
   /// Whether an interval can be integrated: no gap in it, and none at its ends, longer than that.
   [[nodiscard]] bool covers(std::int64_t begin_ns,
                             std::int64_t end_ns,

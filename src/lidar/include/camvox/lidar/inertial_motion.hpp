@@ -59,7 +59,9 @@ class InertialMotionFilter {
  public:
   explicit InertialMotionFilter(const MotionFilterConfig& config);
 
-  void add_reading(const ImuReading& reading) { track_.add(reading); }
+  /// Readings that are known are ignored; one a second older than the newest means that the clock
+  /// was set back, and everything but the bias starts anew.
+  void add_reading(const ImuReading& reading);
   /// Takes readings of an interval in which the rig stood still.
   void add_standstill(std::int64_t begin_ns, std::int64_t end_ns);
   void add_odometry(const OdometryStep& step);
