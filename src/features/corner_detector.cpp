@@ -1,6 +1,7 @@
 #include "camvox/features/corner_detector.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cstddef>
 #include <cstring>
 
@@ -201,9 +202,11 @@ void collect(const Byte* maxima, const Run& run, std::vector<Corner>& corners) {
   for (int word = 0; word < kBlock / 8; ++word) {
     std::uint64_t bytes;
     std::memcpy(&bytes, maxima + 8 * word, sizeof bytes);
-    if (bytes == 0) continue;
-    for (int i = 8 * word; i < 8 * word + 8; ++i) {
-      if (maxima[i] == 0 || run.u + i >= run.end_u) continue;
+    for (int i = 8 * word; bytes != 0; bytes >>= 8, ++i) {
+      const int zeros = std::countr_zero(bytes) / 8;
+      bytes >>= 8 * zeros;
+      i += zeros;
+      if (run.u + i >= run.end_u) return;
       corners.push_back(
           {static_cast<std::uint16_t>(run.u + i), static_cast<std::uint16_t>(run.v), maxima[i]});
     }
@@ -223,15 +226,16 @@ void CornerDetector::detect_rows(const ImageView& image,
   Byte* rows[3] = {score_rows_.data() + kMargin,
                    score_rows_.data() + width + kMargin,
                    score_rows_.data() + 2 * width + kMargin};
-  int counts[2] = {0, 0};
+  int counts[3] = {0, 0, 0};
   alignas(kBlock) Byte maxima[kBlock];
   for (int v = region.begin; v <= region.end_v; ++v) {  // one row more: finishes the last
     Byte* scores = rows[v % 3];
     const Byte* middle = rows[(v + 2) % 3];
     const Byte* above = rows[(v + 1) % 3];
-    std::memset(scores, 0, static_cast<std::size_t>(blocks * kBlock));
-    auto& list = blocks_[v % 2];
-    int& count = counts[v % 2];
+    auto& list = blocks_[v % 3];
+    int& count = counts[v % 3];
+    for (int n = 0; n < count; ++n)
+      std::memset(scores + list[static_cast<std::size_t>(n)], 0, kBlock);
     count = 0;
     if (v < region.end_v) {
       const Byte* row = image.at(region.begin, v);
@@ -241,8 +245,8 @@ void CornerDetector::detect_rows(const ImageView& image,
                   0,
                   static_cast<std::size_t>(blocks * kBlock - (region.end_u - region.begin)));
     }
-    const auto& previous = blocks_[(v + 1) % 2];
-    for (int n = 0; n < counts[(v + 1) % 2]; ++n) {
+    const auto& previous = blocks_[(v + 2) % 3];
+    for (int n = 0; n < counts[(v + 2) % 3]; ++n) {
       const int start = previous[static_cast<std::size_t>(n)];
       keep_maxima(above + start, middle + start, scores + start, maxima);
       collect(maxima, {region.begin + start, v - 1, region.end_u}, corners);

@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 namespace camvox::features {
 namespace {
 
 constexpr int kIndexBits = 32;
+constexpr std::uint64_t kIndexMask = 0xffffffff;
 constexpr int kCoordinateBits = 16;
 
 /// Puts a zero bit before each bit of a 16-bit number.
@@ -56,6 +58,45 @@ void CornerDistribution::split(const Square& square,
   }
 }
 
+void CornerDistribution::grow_tree(std::size_t corners, std::size_t leaves) {
+  squares_.assign(1, {0, static_cast<std::uint32_t>(corners)});
+  for (int bits = kCoordinateBits - 1; bits >= 0 && squares_.size() < leaves; --bits) {
+    // Fullest first, so that the squares left whole when the tree is full hold the least.
+    std::stable_sort(squares_.begin(), squares_.end(), [](const Square& a, const Square& b) {
+      return a.count() > b.count();
+    });
+    next_.clear();
+    for (std::size_t i = 0; i < squares_.size(); ++i) {
+      const bool full = next_.size() + (squares_.size() - i) >= leaves;
+      if (full || squares_[i].count() == 1) {
+        next_.push_back(squares_[i]);
+      } else {
+        split(squares_[i], kIndexBits + 2 * bits, next_);
+      }
+    }
+    squares_.swap(next_);
+  }
+}
+
+void CornerDistribution::take_strongest(const std::vector<Corner>& corners, std::size_t count) {
+  // Scores are bytes: count how many there are of each, from the top.
+  std::array<std::size_t, 256> counts{};
+  for (std::size_t i = 0; i < corners.size(); ++i) counts[taken_[i] != 0 ? 0 : corners[i].score]++;
+  int weakest = 255;
+  std::size_t above = 0;
+  while (weakest > 1 && above + counts[static_cast<std::size_t>(weakest)] < count) {
+    above += counts[static_cast<std::size_t>(weakest--)];
+  }
+  std::size_t of_weakest = count - above;
+  for (const Key key : keys_) {
+    const std::size_t i = key & kIndexMask;
+    if (taken_[i] != 0 || corners[i].score < weakest) continue;
+    if (corners[i].score == weakest && of_weakest == 0) continue;
+    of_weakest -= corners[i].score == weakest ? 1 : 0;
+    taken_[i] = 1;
+  }
+}
+
 void CornerDistribution::choose(const std::vector<Corner>& corners,
                                 int wanted,
                                 std::vector<Corner>& chosen) {
@@ -66,41 +107,25 @@ void CornerDistribution::choose(const std::vector<Corner>& corners,
     return;
   }
   sort_along_curve(corners);
-  squares_.assign(1, {0, static_cast<std::uint32_t>(corners.size())});
-  const auto limit = static_cast<std::size_t>(wanted);
-  for (int bits = kCoordinateBits - 1; bits >= 0 && squares_.size() < limit; --bits) {
-    // Fullest first, so that the squares left whole when the limit is reached hold the least.
-    std::stable_sort(squares_.begin(), squares_.end(), [](const Square& a, const Square& b) {
-      return a.count() > b.count();
-    });
-    next_.clear();
-    for (std::size_t i = 0; i < squares_.size(); ++i) {
-      const bool full = next_.size() + (squares_.size() - i) >= limit;
-      if (full || squares_[i].count() == 1) {
-        next_.push_back(squares_[i]);
-      } else {
-        split(squares_[i], kIndexBits + 2 * bits, next_);
-      }
-    }
-    squares_.swap(next_);
-  }
+  // The last split may give up to three leaves too many.
+  const auto leaves = static_cast<std::size_t>(std::lround(even_share_ * wanted));
+  grow_tree(corners.size(), std::max<std::size_t>(leaves, 4) - 3);
+  taken_.assign(corners.size(), 0);
+  std::size_t taken = 0;
   for (const Square& square : squares_) {
-    const Corner* best = nullptr;
-    for (std::uint32_t i = square.begin; i < square.end; ++i) {
-      const Corner& corner = corners[keys_[i] & 0xffffffff];
-      if (best == nullptr || corner.score > best->score) best = &corner;
+    std::size_t best = keys_[square.begin] & kIndexMask;
+    for (std::uint32_t i = square.begin + 1; i < square.end; ++i) {
+      const std::size_t index = keys_[i] & kIndexMask;
+      if (corners[index].score > corners[best].score) best = index;
     }
-    chosen.push_back(*best);
+    if (taken == static_cast<std::size_t>(wanted)) break;
+    taken_[best] = 1;
+    ++taken;
   }
-  if (chosen.size() > limit) {  // the last split gave up to three too many
-    std::stable_sort(chosen.begin(), chosen.end(), [](const Corner& a, const Corner& b) {
-      return a.score > b.score;
-    });
-    chosen.resize(limit);
+  take_strongest(corners, static_cast<std::size_t>(wanted) - taken);
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    if (taken_[i] != 0) chosen.push_back(corners[i]);
   }
-  std::sort(chosen.begin(), chosen.end(), [](const Corner& a, const Corner& b) {
-    return a.v_px != b.v_px ? a.v_px < b.v_px : a.u_px < b.u_px;
-  });
 }
 
 }  // namespace camvox::features

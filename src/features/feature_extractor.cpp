@@ -18,7 +18,8 @@ const ExtractorConfig& checked(const ExtractorConfig& config) {
 FeatureExtractor::FeatureExtractor(const ExtractorConfig& config)
     : config_(checked(config)),
       pyramid_(config.levels, config.scale_factor),
-      detector_(config.corner_threshold, config.low_threshold) {}
+      detector_(config.corner_threshold, config.low_threshold),
+      distribution_(config.even_share) {}
 
 int FeatureExtractor::budget(int level, int left) const {
   // Levels 0 to `level` share what is left in a geometric series, as their sizes fall.

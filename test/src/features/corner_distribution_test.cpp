@@ -27,7 +27,7 @@ std::vector<Corner> crowded_corners(int count) {
 }
 
 TEST(CornerDistribution, GivesExactlyWhatIsWanted) {
-  CornerDistribution distribution;
+  CornerDistribution distribution(0.5);
   std::vector<Corner> chosen;
   for (const int count : {0, 1, 2, 50, 3000}) {
     const auto corners = crowded_corners(count);
@@ -44,7 +44,7 @@ TEST(CornerDistribution, GivesExactlyWhatIsWanted) {
 TEST(CornerDistribution, SpreadsOverTheImage) {
   const auto corners = crowded_corners(3000);
   std::vector<Corner> chosen;
-  CornerDistribution().choose(corners, 300, chosen);
+  CornerDistribution(1.0).choose(corners, 300, chosen);
   const auto in_crowd = [](const Corner& corner) {
     return corner.u_px >= 100 && corner.u_px < 180 && corner.v_px >= 200 && corner.v_px < 280;
   };
@@ -54,20 +54,40 @@ TEST(CornerDistribution, SpreadsOverTheImage) {
 }
 
 TEST(CornerDistribution, TakesTheStrongestOfEachSquare) {
-  std::vector<Corner> corners = {{10, 10, 50}, {12, 11, 90}, {500, 10, 30}, {505, 14, 20}};
+  // Nine in one square, one far away.
+  std::vector<Corner> corners = {{500, 10, 30}};
+  for (std::uint16_t i = 0; i < 9; ++i) {
+    corners.push_back({static_cast<std::uint16_t>(100 + i % 3),
+                       static_cast<std::uint16_t>(100 + i / 3),
+                       static_cast<std::uint8_t>(40 + i)});
+  }
   std::vector<Corner> chosen;
-  CornerDistribution().choose(corners, 2, chosen);
-  EXPECT_THAT(chosen, ::testing::ElementsAre(corners[2], corners[1]));
+  CornerDistribution(1.0).choose(corners, 5, chosen);
+  EXPECT_THAT(chosen, ::testing::Contains(corners[0]));
+  EXPECT_THAT(chosen, ::testing::Contains(corners[9]));
+}
+
+TEST(CornerDistribution, TheRestAreTheStrongest) {
+  const auto corners = crowded_corners(3000);
+  std::vector<Corner> chosen;
+  CornerDistribution(0.0).choose(corners, 300, chosen);
+  std::vector<int> scores, all;
+  for (const Corner& corner : chosen) scores.push_back(corner.score);
+  for (const Corner& corner : corners) all.push_back(corner.score);
+  std::sort(scores.rbegin(), scores.rend());
+  std::sort(all.rbegin(), all.rend());
+  // But for the one leaf that a tree always has.
+  EXPECT_TRUE(std::equal(scores.begin(), scores.begin() + 299, all.begin()));
 }
 
 TEST(CornerDistribution, DoesNotDependOnTheOrderGiven) {
   auto corners = crowded_corners(2000);
   std::vector<Corner> first, second;
-  CornerDistribution distribution;
+  CornerDistribution distribution(0.5);
   distribution.choose(corners, 200, first);
   std::shuffle(corners.begin(), corners.end(), std::mt19937(1));
   distribution.choose(corners, 200, second);
-  EXPECT_EQ(first, second);
+  EXPECT_THAT(second, ::testing::UnorderedElementsAreArray(first));
 }
 
 }  // namespace

@@ -26,7 +26,11 @@ class DescriptorExtractor {
   static constexpr int kAngles = 128;
   static constexpr int kPatch_px = 31;   ///< Side of the smoothed patch.
   static constexpr int kStride_px = 32;  ///< From row to row of the smoothed patch.
-  using Patch = std::array<std::uint8_t, kPatch_px * kStride_px>;
+  using Patch = std::array<std::uint16_t, kPatch_px * kStride_px>;
+  /// Where a patch keeps the pixel of a column and row: even columns first, then odd ones.
+  [[nodiscard]] static constexpr int place(int column, int row) {
+    return row * kStride_px + column % 2 * (kStride_px / 2) + column / 2;
+  }
 
   DescriptorExtractor();
 
@@ -46,8 +50,8 @@ class DescriptorExtractor {
   std::vector<Offsets> offsets_;
 };
 
-/// Smooths the pixels around a key point: Gaussian of sigma 2 px over 7x7 px, in fixed point
-/// (weights of 256ths, rounded after the rows and after the columns).
+/// Smooths the pixels around a key point by 7x7 weights (1 2 3 3 3 2 1 in both directions), which
+/// are those of a Gaussian of sigma 2 px to within a tenth; the sums of 225 are not divided.
 void smooth_patch(const ImageView& image, int u_px, int v_px, DescriptorExtractor::Patch& patch);
 
 }  // namespace camvox::features

@@ -43,7 +43,7 @@ class CornerDetector {
   int threshold_;
   int low_threshold_;
   std::vector<std::uint8_t> score_rows_;
-  std::vector<std::int32_t> blocks_[2];
+  std::vector<std::int32_t> blocks_[3];
   std::vector<std::uint8_t> cell_filled_;
 };
 

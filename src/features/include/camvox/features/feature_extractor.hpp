@@ -19,6 +19,8 @@ struct ExtractorConfig {
   double scale_factor = 1.2;  ///< From one level to the next.
   int corner_threshold = 20;  ///< Contrast of a corner, grey levels.
   int low_threshold = 7;      ///< The same for cells that have no corner otherwise.
+  double even_share =
+      0.5;  ///< Part of the features that is spread evenly; the rest are the strongest.
 
   template <typename Self, typename Visitor>
   static void visit(Self& self, Visitor&& field) {
@@ -27,6 +29,7 @@ struct ExtractorConfig {
     field("scale_factor", self.scale_factor, config::at_least(1.05), config::at_most(1.7));
     field("corner_threshold", self.corner_threshold, config::at_least(1), config::at_most(254));
     field("low_threshold", self.low_threshold, config::at_least(1), config::at_most(254));
+    field("even_share", self.even_share, config::at_least(0.0), config::at_most(1.0));
   }
 };
 
