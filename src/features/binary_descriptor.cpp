@@ -91,11 +91,12 @@ Descriptor DescriptorExtractor::describe(const ImageView& image,
   const std::uint16_t* offset = offsets_[static_cast<std::size_t>(angle_index(angle_rad))].data();
   Descriptor descriptor;
   for (std::uint8_t& byte : descriptor.bytes) {
-    unsigned bits = 0;
-    for (unsigned bit = 0; bit < 8; ++bit, offset += 2) {
-      bits |= static_cast<unsigned>(patch[offset[0]] < patch[offset[1]]) << bit;
+    unsigned bits = 0;  // the last pair first: each makes room for the next with one addition
+    for (int pair = 7; pair >= 0; --pair) {
+      bits += bits + static_cast<unsigned>(patch[offset[2 * pair]] < patch[offset[2 * pair + 1]]);
     }
     byte = static_cast<std::uint8_t>(bits);
+    offset += 16;
   }
   return descriptor;
 }

@@ -289,4 +289,37 @@ void CornerDetector::detect_cell(const ImageView& image,
   }
 }
 
+namespace {
+
+/// The place of the vertex of a parabola through three scores. The middle one is the largest, but
+/// for corners at the edge of where corners are looked for.
+float vertex(int before, int middle, int after) {
+  const int curvature = 2 * middle - before - after;
+  if (curvature <= 0) return 0.0F;
+  return std::clamp(
+      0.5F * static_cast<float>(after - before) / static_cast<float>(curvature), -0.5F, 0.5F);
+}
+
+}  // namespace
+
+CAMVOX_TARGET_CLONES Shift refine_corner(const ImageView& image, const Corner& corner) {
+  // The 9x9 pixels around the corner, row after row: the scores of its 3x3 neighbours then lie
+  // within one block.
+  constexpr int kReach = kRadius + 1;
+  constexpr int kSide = 2 * kReach + 1;
+  constexpr int kFirst = kRadius * kSide + kRadius;  // of the neighbours
+  Byte patch[kFirst + 2 * kBlock + 16];
+  const Byte* from = image.at(corner.u_px - kReach, corner.v_px - kReach);
+  for (int r = 0; r < kSide; ++r) {
+    std::memcpy(patch + r * kSide, from + r * image.step_bytes, kSide);
+  }
+  std::memset(patch + kSide * kSide, 0, sizeof patch - kSide * kSide);
+  const Circle circle(kSide);
+  alignas(kBlock) Byte scores[kBlock];
+  for (int i = 0; i < kBlock; ++i) scores[i] = corner_score(patch + kFirst + i, circle.offset);
+  const Byte* centre = scores + kSide + 1;
+  return {vertex(centre[-1], centre[0], centre[1]),
+          vertex(centre[-kSide], centre[0], centre[kSide])};
+}
+
 }  // namespace camvox::features

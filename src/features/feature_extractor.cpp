@@ -32,9 +32,10 @@ void FeatureExtractor::describe_level(int level, FrameFeatures& features) const 
   const ImageView& image = pyramid_.level(level);
   const auto scale = static_cast<float>(pyramid_.scale(level));
   for (const Corner& corner : chosen_) {
+    const Shift shift = refine_corner(image, corner);
     KeyPoint key_point;
-    key_point.u_px = (static_cast<float>(corner.u_px) + 0.5F) * scale - 0.5F;
-    key_point.v_px = (static_cast<float>(corner.v_px) + 0.5F) * scale - 0.5F;
+    key_point.u_px = (static_cast<float>(corner.u_px) + shift.du_px + 0.5F) * scale - 0.5F;
+    key_point.v_px = (static_cast<float>(corner.v_px) + shift.dv_px + 0.5F) * scale - 0.5F;
     key_point.angle_rad = orientation_rad(image, corner.u_px, corner.v_px);
     key_point.response = corner.score;
     key_point.octave = static_cast<std::uint8_t>(level);

@@ -54,20 +54,30 @@ int FeatureGrid::row(float v_px) const {
 void FeatureGrid::find(const SearchArea& area, std::vector<std::uint32_t>& found) const {
   found.clear();
   if (entries_.empty() || !area.u_px.allFinite() || !(area.radius_px >= 0.0F)) return;
-  const Vector2f low = area.u_px.array() - area.radius_px;
-  const Vector2f high = area.u_px.array() + area.radius_px;
-  const int first = column(low.x());
-  const int last = column(high.x());
-  for (int r = row(low.y()); r <= row(high.y()); ++r) {
-    const std::uint32_t end = starts_[static_cast<std::size_t>(r * kColumns + last + 1)];
-    for (std::uint32_t i = starts_[static_cast<std::size_t>(r * kColumns + first)]; i < end; ++i) {
+  const int first_column = column(area.u_px.x() - area.radius_px);
+  const int end_column = column(area.u_px.x() + area.radius_px) + 1;
+  const int first_row = row(area.u_px.y() - area.radius_px);
+  const int last_row = row(area.u_px.y() + area.radius_px);
+  const auto start = [&](int r, int c) {
+    return starts_[static_cast<std::size_t>(r * kColumns + c)];
+  };
+  std::size_t most = 0;
+  for (int r = first_row; r <= last_row; ++r) most += start(r, end_column) - start(r, first_column);
+  found.resize(most);
+  std::size_t count = 0;
+  for (int r = first_row; r <= last_row; ++r) {
+    const std::uint32_t end = start(r, end_column);
+    for (std::uint32_t i = start(r, first_column); i < end; ++i) {
+      // Written first and counted after: half of the entries are outside, which no branch foresees.
       const Entry& entry = entries_[i];
-      const bool inside = entry.u_px >= low.x() && entry.u_px <= high.x() &&
-                          entry.v_px >= low.y() && entry.v_px <= high.y() &&
-                          entry.octave >= area.min_octave && entry.octave <= area.max_octave;
-      if (inside) found.push_back(entry.index);
+      found[count] = entry.index;
+      const bool inside_u = std::abs(entry.u_px - area.u_px.x()) <= area.radius_px;
+      const bool inside_v = std::abs(entry.v_px - area.u_px.y()) <= area.radius_px;
+      const bool seen = (entry.octave >= area.min_octave) & (entry.octave <= area.max_octave);
+      count += static_cast<std::size_t>(inside_u & inside_v & seen);
     }
   }
+  found.resize(count);
 }
 
 std::vector<std::uint32_t> FeatureGrid::find(const SearchArea& area) const {

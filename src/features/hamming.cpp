@@ -36,6 +36,16 @@ CAMVOX_TARGET_CLONES void hamming_distances(const Descriptor& query,
   }
 }
 
+CAMVOX_TARGET_CLONES void hamming_distances(const Descriptor& query,
+                                            std::span<const Descriptor> descriptors,
+                                            std::span<const std::uint32_t> candidates,
+                                            std::span<std::uint16_t> distances) {
+  if (candidates.size() != distances.size()) throw std::logic_error("lists of different length");
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    distances[i] = static_cast<std::uint16_t>(distance(query, descriptors[candidates[i]]));
+  }
+}
+
 CAMVOX_TARGET_CLONES Nearest nearest_descriptor(const Descriptor& query,
                                                 std::span<const Descriptor> descriptors,
                                                 std::span<const std::uint32_t> candidates) {

@@ -39,22 +39,34 @@ class Assignment {
   std::vector<Match> best_;
 };
 
-/// The two nearest of the candidates, the second counted only within the octave of the nearest.
-Nearest nearest_of_octave(const Descriptor& query,
-                          const FrameFeatures& frame,
-                          std::span<const std::uint32_t> candidates) {
-  Nearest nearest = nearest_descriptor(query, frame.descriptors, candidates);
-  if (nearest.index < 0) return nearest;
-  const auto octave = frame.key_points[static_cast<std::size_t>(nearest.index)].octave;
-  int second = kDescriptorBits + 1;
-  for (const std::uint32_t candidate : candidates) {
-    if (candidate == static_cast<std::uint32_t>(nearest.index)) continue;
-    if (frame.key_points[candidate].octave != octave) continue;
-    second = std::min(second, hamming_distance(query, frame.descriptors[candidate]));
+/// Finds the two nearest of some candidates, the second counted only within the octave of the
+/// nearest.
+class OctaveSearch {
+ public:
+  explicit OctaveSearch(const FrameFeatures& frame) : frame_(frame) {}
+
+  Nearest find(const Descriptor& query, std::span<const std::uint32_t> candidates) {
+    Nearest nearest;
+    if (candidates.empty()) return nearest;
+    distances_.resize(candidates.size());
+    hamming_distances(query, frame_.descriptors, candidates, distances_);
+    const auto best = std::min_element(distances_.begin(), distances_.end());
+    const auto index = candidates[static_cast<std::size_t>(best - distances_.begin())];
+    nearest.index = static_cast<int>(index);
+    nearest.distance = *best;
+    const auto octave = frame_.key_points[index].octave;
+    for (std::size_t i = 0; i < candidates.size(); ++i) {
+      if (distances_[i] >= nearest.second_distance || candidates[i] == index) continue;
+      if (frame_.key_points[candidates[i]].octave == octave)
+        nearest.second_distance = distances_[i];
+    }
+    return nearest;
   }
-  nearest.second_distance = second;
-  return nearest;
-}
+
+ private:
+  const FrameFeatures& frame_;
+  std::vector<std::uint16_t> distances_;
+};
 
 std::vector<float> angles_of(std::span<const KeyPoint> key_points) {
   std::vector<float> angles_rad;
@@ -96,6 +108,7 @@ std::vector<Match> match_by_projection(std::span<const Expected> expected,
                                        std::span<const std::uint8_t> taken,
                                        const MatchConfig& config) {
   Assignment assignment(frame.size());
+  OctaveSearch search(frame);
   std::vector<std::uint32_t> candidates;
   std::vector<float> angles_rad;
   for (std::size_t query = 0; query < expected.size(); ++query) {
@@ -104,7 +117,7 @@ std::vector<Match> match_by_projection(std::span<const Expected> expected,
     if (!taken.empty()) {
       std::erase_if(candidates, [&](std::uint32_t candidate) { return taken[candidate] != 0; });
     }
-    const Nearest nearest = nearest_of_octave(expected[query].descriptor, frame, candidates);
+    const Nearest nearest = search.find(expected[query].descriptor, candidates);
     if (nearest.index < 0 || nearest.distance > config.max_distance) continue;
     if (!is_distinct(nearest.distance, nearest.second_distance, config)) continue;
     assignment.offer({static_cast<std::uint32_t>(query),

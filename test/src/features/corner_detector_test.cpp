@@ -152,5 +152,42 @@ TEST(CornerDetector, LooksCloserAtPoorCells) {
   for (const Corner& corner : corners) EXPECT_EQ(corner.score, 12);
 }
 
+TEST(RefineCorner, IsTheVertexOfTheScores) {
+  const TestImage image = block_image(200, 150, 12);
+  std::vector<Corner> corners;
+  CornerDetector(20, 7).detect(image.view(), corners);
+  ASSERT_GT(corners.size(), 50U);
+  for (const Corner& corner : corners) {
+    const auto score = [&](int du, int dv) {
+      return slow_score(image, corner.u_px + du, corner.v_px + dv);
+    };
+    const Shift shift = refine_corner(image.view(), corner);
+    const double curvature_u = 2.0 * score(0, 0) - score(-1, 0) - score(1, 0);
+    const double curvature_v = 2.0 * score(0, 0) - score(0, -1) - score(0, 1);
+    const auto vertex = [](double slope, double curvature) {
+      return curvature > 0 ? std::clamp(slope / (2.0 * curvature), -0.5, 0.5) : 0.0;
+    };
+    const double du_px = vertex(score(1, 0) - score(-1, 0), curvature_u);
+    const double dv_px = vertex(score(0, 1) - score(0, -1), curvature_v);
+    EXPECT_NEAR(shift.du_px, du_px, 1e-6);
+    EXPECT_NEAR(shift.dv_px, dv_px, 1e-6);
+    EXPECT_LE(std::abs(shift.du_px), 0.5F);
+  }
+}
+
+TEST(RefineCorner, FollowsAnImageThatMovesByPartsOfAPixel) {
+  // A bright blob of sigma 1.5 px: its centre is found to a tenth of a pixel wherever it lies.
+  for (int tenths = -4; tenths <= 4; ++tenths) {
+    const double centre_px = 30.0 + 0.1 * tenths;
+    const TestImage image(60, 60, [&](int u, int v) {
+      const double r2 = (u - centre_px) * (u - centre_px) + (v - 30.0) * (v - 30.0);
+      return static_cast<int>(std::lround(20.0 + 200.0 * std::exp(-r2 / 4.5)));
+    });
+    const Shift shift = refine_corner(image.view(), {30, 30, 1});
+    EXPECT_NEAR(shift.du_px, 0.1 * tenths, 0.12);
+    EXPECT_NEAR(shift.dv_px, 0.0, 0.02);
+  }
+}
+
 }  // namespace
 }  // namespace camvox::features

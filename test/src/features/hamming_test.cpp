@@ -37,6 +37,12 @@ TEST(Hamming, CountsDifferingBits) {
   Descriptor ones;
   ones.bytes.fill(0xff);
   EXPECT_EQ(hamming_distance(ones, Descriptor{}), kDescriptorBits);
+  const std::vector<std::uint32_t> some = {39, 2, 2};
+  distances.resize(3);
+  hamming_distances(ones, descriptors, some, distances);
+  EXPECT_EQ(distances[0], slow_distance(ones, descriptors[39]));
+  EXPECT_EQ(distances[2], slow_distance(ones, descriptors[2]));
+  EXPECT_THROW(hamming_distances(ones, descriptors, some, {}), std::logic_error);
   EXPECT_THROW(hamming_distances(ones, descriptors, {}), std::logic_error);
 }
 

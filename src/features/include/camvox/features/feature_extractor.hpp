@@ -35,7 +35,7 @@ struct ExtractorConfig {
 
 /// Finds and describes the features of grey images: FAST corners on a pyramid, spread evenly,
 /// with orientation and a rotated binary descriptor (ORB: Rublee et al., ICCV 2011; ours differs in
-/// the sampling pattern, the even spread and the exact pixel centres between levels).
+/// the sampling pattern, the spread, places between pixels and exact pixel centres between levels).
 /// Deterministic; keeps its memory from image to image, so one object per thread.
 class FeatureExtractor {
  public:

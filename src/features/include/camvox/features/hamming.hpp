@@ -17,6 +17,12 @@ void hamming_distances(const Descriptor& query,
                        std::span<const Descriptor> descriptors,
                        std::span<std::uint16_t> distances);
 
+/// The distance of `query` to those of `descriptors` that `candidates` lists.
+void hamming_distances(const Descriptor& query,
+                       std::span<const Descriptor> descriptors,
+                       std::span<const std::uint32_t> candidates,
+                       std::span<std::uint16_t> distances);
+
 /// The nearest of some descriptors, and the distance of the second nearest.
 struct Nearest {
   int index = -1;  ///< -1: there is none.
