@@ -20,6 +20,7 @@ inline constexpr std::string_view kClock = "/clock";
 // Edge topics, out.
 inline constexpr std::string_view kOdometry = "/camvox/odometry";
 inline constexpr std::string_view kPath = "/camvox/path";
+inline constexpr std::string_view kDenseMap = "/camvox/dense_map";
 inline constexpr std::string_view kTransforms = "/tf";
 inline constexpr std::string_view kStaticTransforms = "/tf_static";
 inline constexpr std::string_view kDiagnostics = "/diagnostics";

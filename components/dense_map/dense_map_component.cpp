@@ -1,0 +1,156 @@
+#include "camvox/dense_map/dense_map_component.hpp"
+
+#include <chrono>
+#include <cstring>
+#include <filesystem>
+
+#include "camvox/conversion/pose.hpp"
+#include "cloud_file.hpp"
+
+namespace camvox {
+namespace {
+
+using sensor_msgs::msg::PointCloud2;
+using sensor_msgs::msg::PointField;
+
+/// Frames whose images wait for the news that they are a keyframe.
+constexpr std::size_t kFramesKept = 4;
+constexpr std::uint32_t kPointBytes = 16;  // x y z as float, rgb packed into one
+
+void write_points(const std::vector<dense::ColouredPoint>& points, PointCloud2& cloud) {
+  const char* names[] = {"x", "y", "z", "rgb"};
+  for (std::uint32_t i = 0; i < 4; ++i) {
+    PointField field;
+    field.name(names[i]);
+    field.offset(4 * i);
+    field.datatype(7);  // FLOAT32
+    field.count(1);
+    cloud.fields().push_back(field);
+  }
+  cloud.height(1);
+  cloud.width(static_cast<std::uint32_t>(points.size()));
+  cloud.point_step(kPointBytes);
+  cloud.row_step(kPointBytes * cloud.width());
+  cloud.is_dense(true);
+  cloud.data().resize(kPointBytes * points.size());
+  auto* out = cloud.data().data();
+  for (const auto& [p, rgb] : points) {
+    const std::uint32_t packed =
+        (std::uint32_t{rgb[0]} << 16) | (std::uint32_t{rgb[1]} << 8) | rgb[2];
+    std::memcpy(out, p.data(), 12);
+    std::memcpy(out + 12, &packed, 4);
+    out += kPointBytes;
+  }
+}
+
+}  // namespace
+
+DenseMapComponent::DenseMapComponent(Context& context)
+    : context_(context),
+      config_(context.parameters<DenseMapComponentConfig>()),
+      map_(config_.map, sensors::CameraModel(config_.camera)),
+      progress_(context),
+      cloud_(context.advertise<PointCloud2>({"dense_map", topics::kDenseMap}, {.max_loans = 1})) {
+  const SubscribeOptions frames{.qos = qos::kFrames, .max_held = kFramesKept};
+  context.subscribe<FrameImage>(
+      {"frame_image", topics::kFrameImage},
+      [this](const auto& image) { keep(images_, image); },
+      frames);
+  context.subscribe<DepthImage>(
+      {"depth_image", topics::kDepthImage},
+      [this](const auto& depth) { keep(depths_, depth); },
+      frames);
+  context.subscribe<Keyframe>({"keyframe", topics::kKeyframe},
+                              [this](const auto& keyframe) { on_keyframe(*keyframe); },
+                              {.qos = qos::kKeyframes});
+  context.subscribe<MapUpdate>({"map_update", topics::kMapUpdate},
+                               [this](const auto& update) { on_update(*update); },
+                               {.qos = qos::kKeyframes, .required = false});
+  const auto period = std::chrono::duration<double>(config_.publish_period_s);
+  context.every(std::chrono::duration_cast<std::chrono::nanoseconds>(period),
+                [this] { publish(); });
+}
+
+template <typename Message>
+void DenseMapComponent::keep(std::map<std::uint64_t, Sample<Message>>& frames,
+                             const Sample<Message>& sample) {
+  const auto work = progress_.measure();
+  const auto frame_id = sample->header().frame_id();
+  frames.insert_or_assign(frame_id, sample);
+  while (frames.size() >= kFramesKept) frames.erase(frames.begin());
+  add_if_complete(frame_id);
+}
+
+void DenseMapComponent::on_keyframe(const Keyframe& keyframe) {
+  const auto work = progress_.measure();
+  const auto frame_id = keyframe.header().frame_id();
+  pending_[frame_id] = {keyframe.id(), conversion::to_se3(keyframe.T_map_camera())};
+  add_if_complete(frame_id);
+  while (pending_.size() > kFramesKept) {
+    pending_.erase(pending_.begin());
+    context_.diagnostics().set("keyframes without images", ++missed_);
+  }
+}
+
+void DenseMapComponent::add_if_complete(std::uint64_t frame_id) {
+  const auto keyframe = pending_.find(frame_id);
+  const auto image = images_.find(frame_id);
+  const auto depth = depths_.find(frame_id);
+  if (keyframe == pending_.end() || image == images_.end() || depth == depths_.end()) return;
+  const auto& i = *image->second;
+  const auto& d = *depth->second;
+  if (d.depth_m_count() > 0) {
+    map_.add_keyframe(keyframe->second.id,
+                      keyframe->second.T_map_camera,
+                      {d.depth_m().data(),
+                       d.sigma_m().data(),
+                       static_cast<int>(d.width_px()),
+                       static_cast<int>(d.height_px())},
+                      {i.data().data(),
+                       static_cast<int>(i.width_px()),
+                       static_cast<int>(i.height_px()),
+                       static_cast<int>(i.row_step_bytes()),
+                       static_cast<dense::Encoding>(i.encoding())});
+  }
+  const auto header = d.header();
+  pending_.erase(keyframe);
+  context_.diagnostics().set("points", map_.size());
+  progress_.done(header);
+}
+
+void DenseMapComponent::on_update(const MapUpdate& update) {
+  for (std::uint32_t i = 0; i < update.keyframe_ids_count(); ++i) {
+    map_.move_keyframe(update.keyframe_ids()[i], conversion::to_se3(update.keyframe_poses()[i]));
+  }
+  for (std::uint32_t i = 0; i < update.removed_keyframe_ids_count(); ++i) {
+    map_.remove_keyframe(update.removed_keyframe_ids()[i]);
+  }
+}
+
+void DenseMapComponent::publish() {
+  if (cloud_.subscriber_count() == 0 || map_.size() == 0) return;
+  auto cloud = cloud_.loan();
+  const auto now_ns = context_.now_ns();
+  cloud->header().stamp().sec(static_cast<std::int32_t>(now_ns / 1'000'000'000));
+  cloud->header().stamp().nanosec(static_cast<std::uint32_t>(now_ns % 1'000'000'000));
+  cloud->header().frame_id("map");
+  write_points(map_.points(), *cloud);
+  cloud_.publish(std::move(cloud));
+}
+
+void DenseMapComponent::stop() {
+  images_.clear();
+  depths_.clear();
+  if (config_.output_dir.empty() || map_.size() == 0) return;
+  const std::filesystem::path folder = config_.output_dir;
+  const auto points = map_.points();
+  const auto picture = dense::draw_top_view(points, map_.keyframe_positions());
+  for (const auto& problem : {dense_map::save_pcd(folder / "dense_map.pcd", points),
+                              dense_map::save_ply(folder / "dense_map.ply", points),
+                              dense_map::save_png(folder / "dense_map.png", picture)}) {
+    if (!problem.empty()) context_.log().error("{}", problem);
+  }
+  context_.log().info("dense map: {} points", points.size());
+}
+
+}  // namespace camvox
