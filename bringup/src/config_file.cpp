@@ -5,6 +5,7 @@
 #include <optional>
 #include <sstream>
 
+#include "camvox/bringup/parameter_file.hpp"
 #include "camvox/bringup/system_config.hpp"
 #include "camvox/interfaces/topics.hpp"
 #include "yaml_reader.hpp"
@@ -62,7 +63,7 @@ class ConfigFileReader {
   /// Files of shared parameters from the command line: they win over the config.
   void add_parameter_files(const std::vector<std::filesystem::path>& files) {
     for (const auto& file : files) {
-      for (auto& [key, parameter] : read_parameter_file(file, {"--parameters", 0})) {
+      for (auto& [key, parameter] : read_parameter_file(file, problems_)) {
         config_.shared_parameters.insert_or_assign(key, parameter);
         config_.file_parameters.insert(key);
       }
@@ -140,27 +141,11 @@ class ConfigFileReader {
         yaml_.report(node, "parameter_files", "expected a file name");
         continue;
       }
-      for (auto& [key, parameter] :
-           read_parameter_file(folder / node.Scalar(), yaml_.location(node))) {
+      for (auto& [key, parameter] : read_parameter_file(folder / node.Scalar(), problems_)) {
         if (config_.shared_parameters.emplace(key, parameter).second) {
           config_.file_parameters.insert(key);
         }
       }
-    }
-  }
-
-  ParameterMap read_parameter_file(const std::filesystem::path& file, const Location& named_at) {
-    const auto text = read_text(file);
-    if (!text) {
-      problems_.push_back({named_at, "parameter_files", file.string() + " cannot be read"});
-      return {};
-    }
-    try {
-      YamlReader reader(file, problems_);
-      return reader.parameters(YAML::Load(*text), "");
-    } catch (const YAML::Exception& error) {
-      problems_.push_back({{file, error.mark.line + 1}, "", "not valid YAML: " + error.msg});
-      return {};
     }
   }
 

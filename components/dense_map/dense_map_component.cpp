@@ -4,6 +4,7 @@
 #include <cstring>
 #include <filesystem>
 
+#include "camvox/conversion/image.hpp"
 #include "camvox/conversion/pose.hpp"
 #include "cloud_file.hpp"
 
@@ -99,18 +100,19 @@ void DenseMapComponent::add_if_complete(std::uint64_t frame_id) {
   if (keyframe == pending_.end() || image == images_.end() || depth == depths_.end()) return;
   const auto& i = *image->second;
   const auto& d = *depth->second;
-  if (d.depth_m_count() > 0) {
+  const bool usable = d.depth_m_count() > 0 && conversion::is_well_formed(i) &&
+                      i.width_px() == d.width_px() && i.height_px() == d.height_px();
+  if (usable) {
     map_.add_keyframe(keyframe->second.id,
                       keyframe->second.T_map_camera,
                       {d.depth_m().data(),
                        d.sigma_m().data(),
                        static_cast<int>(d.width_px()),
                        static_cast<int>(d.height_px())},
-                      {i.data().data(),
-                       static_cast<int>(i.width_px()),
-                       static_cast<int>(i.height_px()),
-                       static_cast<int>(i.row_step_bytes()),
-                       static_cast<dense::Encoding>(i.encoding())});
+                      [&i](int u_px, int v_px) {
+                        const auto bgr = conversion::bgr_at(i, u_px, v_px);
+                        return dense::Rgb{bgr[2], bgr[1], bgr[0]};
+                      });
   }
   const auto header = d.header();
   pending_.erase(keyframe);

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <numbers>
 
+#include "calibration_file.hpp"
 #include "camvox/interfaces/topics.hpp"
 #include "image_file.hpp"
 #include "import_job.hpp"
@@ -80,6 +81,7 @@ class KittiImport {
       events_[i].write();
     }
     job_.progress(events_.size(), events_.size());
+    write_rig();
     return job_.finish();
   }
 
@@ -187,6 +189,20 @@ class KittiImport {
     }
     job_.report.left_out.push_back(
         {name, 1, name.starts_with("image_") ? "another camera was chosen" : "no topic for it"});
+  }
+
+  /// The body is the IMU: OXTS gives its poses.
+  void write_rig() {
+    if (!calibration_.camera || !calibration_.T_imu_lidar || !calibration_.T_lidar_camera) return;
+    const auto to_se3 = [](const Eigen::Isometry3d& T) {
+      return geometry::SE3::from_matrix(T.matrix());
+    };
+    sensors::RigCalibration rig;
+    rig.T_lidar_camera = to_se3(*calibration_.T_lidar_camera);
+    rig.T_imu_lidar = to_se3(*calibration_.T_imu_lidar);
+    rig.T_body_camera = rig.T_imu_lidar * rig.T_lidar_camera;
+    job_.write_file("rig.yaml",
+                    calibration_text(to_intrinsics(*calibration_.camera), sensors::to_config(rig)));
   }
 
   void write_static_transforms(std::int64_t stamp_ns) {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 
+#include "calibration_file.hpp"
 #include "camvox/interfaces/topics.hpp"
 #include "image_file.hpp"
 #include "import_job.hpp"
@@ -104,6 +105,7 @@ class SevenScenesImport {
         options_.rig.p_camera_depth_m[0],
         options_.rig.p_camera_depth_m[1],
         options_.rig.p_camera_depth_m[2]));
+    job_.write_file("rig.yaml", calibration_text(to_intrinsics(camera_), camera_only_rig()));
     return job_.finish();
   }
 

@@ -4,6 +4,7 @@
 
 #include <map>
 
+#include "calibration_file.hpp"
 #include "camvox/interfaces/topics.hpp"
 #include "camvox/simulation/jpeg.hpp"
 #include "camvox/simulation/loop_pairs.hpp"
@@ -18,18 +19,6 @@ namespace {
 namespace topics = interfaces::topics;
 using geometry::SE3;
 using simulation::SimulationOptions;
-
-/// A rig.yaml: parameters that every component with a calibration takes.
-struct CalibrationFile {
-  sensors::CameraIntrinsics camera;
-  sensors::RigConfig rig;
-
-  template <typename Self, typename Visitor>
-  static void visit(Self& self, Visitor&& field) {
-    field("camera", self.camera);
-    field("rig", self.rig);
-  }
-};
 
 std::string tum_line(std::int64_t stamp_ns, const SE3& T) {
   constexpr std::int64_t kSecond_ns = 1'000'000'000;
@@ -130,8 +119,7 @@ class Recording {
   }
 
   void write_rig(const std::string& name, const sensors::RigCalibration& rig) {
-    const CalibrationFile file{simulation_.intrinsics, sensors::to_config(rig)};
-    job_.write_file(name, config::to_yaml(config::dump(file)));
+    job_.write_file(name, calibration_text(simulation_.intrinsics, sensors::to_config(rig)));
   }
 
   /// Of images that were sent; stamps stand for them, since readers count frames as they like.

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calibration_file.hpp"
 #include "camvox/interfaces/topics.hpp"
 #include "image_file.hpp"
 #include "import_job.hpp"
@@ -62,6 +63,7 @@ class TumRgbdImport {
       job_.report.notes.push_back(
           fmt::format("depth: {:g} units a metre, as 16UC1 in mm", options_.depth_units_per_m));
     }
+    job_.write_file("rig.yaml", calibration_text(to_intrinsics(camera_), camera_only_rig()));
     return job_.finish();
   }
 

@@ -48,10 +48,9 @@ DenseMap::DenseMap(const DenseMapConfig& config, const sensors::CameraModel& cam
 std::size_t DenseMap::add_keyframe(std::uint64_t id,
                                    const geometry::SE3& T_map_camera,
                                    const DepthImageView& depth,
-                                   const ImageView& image) {
-  if (depth.width_px != width_px_ || depth.height_px != height_px_ || image.width_px != width_px_ ||
-      image.height_px != height_px_) {
-    throw std::logic_error("DenseMap: an image is not of the camera's size");
+                                   const ColourAt& colour_at) {
+  if (depth.width_px != width_px_ || depth.height_px != height_px_) {
+    throw std::logic_error("DenseMap: the depth image is not of the camera's size");
   }
   if (blocks_.contains(id)) return 0;
   if (voxels_stale_) refill_voxels();
@@ -71,7 +70,7 @@ std::size_t DenseMap::add_keyframe(std::uint64_t id,
       const Eigen::Vector3f p_camera(rays_[ray].x() * z, rays_[ray].y() * z, z);
       const Eigen::Vector3f p_map = R_map_camera * p_camera + t_map_camera;
       if (!voxels_.insert(voxel_key(p_map, config_.voxel_size_m)).second) continue;
-      block.points_camera.push_back({p_camera, colour_at(image, u, v)});
+      block.points_camera.push_back({p_camera, colour_at(u, v)});
     }
   }
   block.points_camera.shrink_to_fit();

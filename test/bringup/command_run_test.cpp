@@ -122,7 +122,7 @@ TEST_F(CommandRun, ParameterFilesServeEveryComponentThatHasTheParameter) {
   const auto missing =
       command({"run", write("rig.yaml", kTicker), "--check", "--parameters", "/no/such.yaml"});
   EXPECT_EQ(missing.exit_code, 1);
-  EXPECT_THAT(missing.output, HasSubstr("/no/such.yaml cannot be read"));
+  EXPECT_THAT(missing.output, HasSubstr("/no/such.yaml: there is no such file"));
 }
 
 TEST_F(CommandRun, ExitCodeTellsThatAComponentHasFailed) {

@@ -24,13 +24,14 @@ sensors::CameraIntrinsics small_camera() {
 
 /// A wall `z` m ahead of the camera, grey 200.
 struct Wall {
-  explicit Wall(float z) : depth_m(64 * 48, z), sigma_m(64 * 48, 0.02F), grey(64 * 48, 200) {}
+  explicit Wall(float z) : depth_m(64 * 48, z), sigma_m(64 * 48, 0.02F) {}
   [[nodiscard]] DepthImageView depth() const { return {depth_m.data(), sigma_m.data(), 64, 48}; }
-  [[nodiscard]] ImageView image() const { return {grey.data(), 64, 48, 64, Encoding::kMono8}; }
+  [[nodiscard]] static ColourAt image() {
+    return [](int, int) { return Rgb{200, 200, 200}; };
+  }
 
   std::vector<float> depth_m;
   std::vector<float> sigma_m;
-  std::vector<std::uint8_t> grey;
 };
 
 DenseMap make_map(DenseMapConfig config = {}) {

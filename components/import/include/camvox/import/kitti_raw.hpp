@@ -22,6 +22,8 @@ struct KittiRawOptions : ImportOptions {
 /// | /ground_truth/odometry | OXTS: base_link in `map` (east, north, up; origin: first fix) |
 /// | /tf_static | base_link = imu_link -> velodyne -> camera_optical_frame |
 ///
+/// Beside them rig.yaml, for `camvox run --parameters`: body = IMU.
+///
 /// A cloud is stamped with the start of its sweep and logged at its end, as a driver sends it. The
 /// time of a point is derived from its azimuth: see `sweep_time_ns`. Positions are OXTS latitudes
 /// and longitudes under the Mercator projection of KITTI's development kit. Time stamps carry no

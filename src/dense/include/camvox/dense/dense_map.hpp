@@ -1,13 +1,14 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <unordered_set>
 #include <vector>
 
 #include "camvox/config/parameters.hpp"
-#include "camvox/dense/image_view.hpp"
 #include "camvox/geometry/se3.hpp"
 #include "camvox/sensors/camera_model.hpp"
 
@@ -33,6 +34,11 @@ struct DenseMapConfig {
   }
 };
 
+using Rgb = std::array<std::uint8_t, 3>;
+
+/// The colour of a pixel of the camera's image.
+using ColourAt = std::function<Rgb(int u_px, int v_px)>;
+
 struct ColouredPoint {
   Eigen::Vector3f p;
   Rgb rgb{};
@@ -56,12 +62,12 @@ class DenseMap {
   /// Throws config::ConfigError.
   DenseMap(const DenseMapConfig& config, const sensors::CameraModel& camera);
 
-  /// Adds what a keyframe sees. Both images must have the camera's size, else std::logic_error.
+  /// Adds what a keyframe sees. `depth` must have the camera's size, else std::logic_error.
   /// Returns how many points came.
   std::size_t add_keyframe(std::uint64_t id,
                            const geometry::SE3& T_map_camera,
                            const DepthImageView& depth,
-                           const ImageView& image);
+                           const ColourAt& colour_at);
   void move_keyframe(std::uint64_t id, const geometry::SE3& T_map_camera);
   /// The keyframe is gone, what it saw is not: its points hang on the nearest older keyframe from
   /// now on, or the nearest newer one.
