@@ -20,43 +20,16 @@ constexpr Qos kImageReader{16, false, false};
 constexpr Qos kLidarReader{256, false, false};
 constexpr Qos kImuReader{2000, false, false};
 
-SyncComponentConfig checked(SyncComponentConfig config) {
-  auto problems = sensors::check(config.camera);
-  std::ranges::move(sensors::check(config.rig), std::back_inserter(problems));
-  if (!problems.empty()) throw config::ConfigError(std::move(problems));
-  return config;
-}
-
-lidar::NoiseConfidence noise_of(const std::string& name) {
-  if (name == "off") return lidar::NoiseConfidence::kKeepAll;
-  if (name == "high") return lidar::NoiseConfidence::kHigh;
-  return name == "low" ? lidar::NoiseConfidence::kLow : lidar::NoiseConfidence::kModerate;
-}
-
-sync::AssemblerOptions options_of(const SyncComponentConfig& config) {
-  sync::AssemblerOptions options;
-  options.use_lidar = config.depth_source != "depth_image";
-  options.lockstep = config.lockstep;
-  options.camera_time_offset_ns =
-      config.rig.camera_time_offset_ns +
-      std::llround(1e9 * config.row_time_s * 0.5 * (config.camera.height_px - 1));
-  options.imu_time_offset_ns = config.rig.imu_time_offset_ns;
-  options.max_imu_samples = camvox_interfaces::msg::SCAN_IMU_SAMPLES;
-  return options;
-}
-
 double seconds(std::int64_t time_ns) { return 1e-9 * static_cast<double>(time_ns); }
 
 }  // namespace
 
 SyncComponent::SyncComponent(Context& context)
     : context_(context),
-      config_(checked(context.parameters<SyncComponentConfig>())),
-      lidar_options_{noise_of(config_.noise_filter),
-                     config_.point_time_unit,
-                     sync::to_ns(config_.sync.clock_jump_s)},
+      config_(sync_component::checked(context.parameters<SyncComponentConfig>())),
+      lidar_options_(sync_component::lidar_input_options(config_)),
       image_input_(config_.camera, config_.encoding),
-      assembler_(config_.sync, options_of(config_)),
+      assembler_(config_.sync, sync_component::assembler_options(config_)),
       depth_pairing_(sync::to_ns(config_.sync.max_time_difference_s),
                      sync::to_ns(config_.sync.clock_jump_s),
                      static_cast<std::size_t>(config_.sync.max_pending_frames)),
@@ -177,22 +150,14 @@ void SyncComponent::on_depth(const Image& image) {
 
 void SyncComponent::on_imu(const Imu& imu) {
   const auto work = progress_.measure();
-  const auto& rate = imu.angular_velocity();
-  const auto& force = imu.linear_acceleration();
-  const double norm = std::hypot(force.x(), force.y(), force.z());
-  if (!std::isfinite(norm + rate.x() + rate.y() + rate.z())) {
+  const auto sample = sync_component::read_imu(imu, force_unit_);
+  if (!sample) {
     ++assembler_.imu().counters().malformed;
     return;
   }
-  force_unit_.add(norm);
-  const double unit_m_s2 = force_unit_.factor_m_s2().value_or(1.0);
   const std::int64_t now_ns = context_.now_ns();
-  const std::int64_t stamp_ns = stamp_of(imu.header());
-  report_.imu_came(seconds(now_ns - stamp_ns));
-  assembler_.add_imu({stamp_ns,
-                      {rate.x(), rate.y(), rate.z()},
-                      {unit_m_s2 * force.x(), unit_m_s2 * force.y(), unit_m_s2 * force.z()}},
-                     now_ns);
+  report_.imu_came(seconds(now_ns - sample->stamp_ns));
+  assembler_.add_imu(*sample, now_ns);
   publish_ready();
 }
 
@@ -224,7 +189,7 @@ void SyncComponent::publish(const sync::Frame& frame) {
   try {
     if (has_lidar()) {
       auto scan = scans_.loan();
-      write_scan(frame, *scan, *image);
+      fill(*scan, frame, *image);
       frame_images_.publish(std::move(image));
       scans_.publish(std::move(scan));
     } else {
@@ -238,37 +203,17 @@ void SyncComponent::publish(const sync::Frame& frame) {
   report_progress(frame.stamp_ns, next_frame_id_++);
 }
 
-void SyncComponent::write_scan(const sync::Frame& frame, Scan& scan, const FrameImage& image) {
-  const std::size_t capacity = scan.points().size();
-  auto* const rows = reinterpret_cast<float(*)[4]>(scan.points().data()->data());
-  const auto cut = assembler_.lidar().cut(frame.window,
-                                          {{rows, capacity},
-                                           {scan.point_offset_ns().data(), capacity},
-                                           {scan.point_line().data(), capacity}});
-  if (cut.over_capacity) {
+void SyncComponent::fill(Scan& scan, const sync::Frame& frame, const FrameImage& image) {
+  scan.header(image.header());
+  if (!sync_component::write_scan(frame, assembler_.lidar(), scan)) {
     ++assembler_.frame_counters().over_capacity;
     report_.set_input_problem("window holds more returns than a scan can carry; shorten window_s");
   }
-  scan.header().stamp_ns(cut.stamp_ns);
-  scan.header().frame_id(next_frame_id_);
-  scan.image_stamp_ns(frame.stamp_ns);
-  const auto count = static_cast<std::uint32_t>(cut.count);
-  scan.points_count(count);
-  scan.point_offset_ns_count(count);
-  scan.point_line_count(count);
-  const auto imu_count = static_cast<std::uint32_t>(frame.imu.size());
-  for (std::size_t i = 0; i < frame.imu.size(); ++i) {
-    const auto& sample = frame.imu[i];
-    scan.imu_stamp_ns()[i] = sample.stamp_ns;
-    std::ranges::copy(sample.gyro_rad_s, scan.imu()[i].begin());
-    std::ranges::copy(sample.force_m_s2, scan.imu()[i].begin() + 3);
-  }
-  scan.imu_stamp_ns_count(imu_count);
-  scan.imu_count(imu_count);
   // Interleaved colours average to brightness as well: blocks just get narrower.
   auto blocks = lidar::block_means(
       image.data().data(), image.row_step_bytes(), image.height_px(), image.row_step_bytes());
-  scan.stationary(stationary_.add(std::move(blocks), {scan.imu().data(), imu_count}) ? 1 : 0);
+  const bool still = stationary_.add(std::move(blocks), {scan.imu().data(), scan.imu_count()});
+  scan.stationary(still ? 1 : 0);
   // Of the image before: the message that begins with this one is not there yet.
   if (previous_image_ns_) {
     const auto nearest_ns = assembler_.lidar().nearest_stamp_ns(*previous_image_ns_);

@@ -12,6 +12,7 @@
 #include "camvox/sync/frame_assembler.hpp"
 #include "camvox/sync_component/image_input.hpp"
 #include "camvox/sync_component/lidar_input.hpp"
+#include "camvox/sync_component/scan_output.hpp"
 #include "camvox/test/moving_rig.hpp"
 
 namespace camvox {
@@ -129,16 +130,8 @@ class Sync {
     assembler_.add_image(image_ns, image_ns);
     const auto frame = assembler_.take_ready(image_ns);
     if (!frame) std::abort();
-    const std::size_t capacity = scan_->points().size();
-    const auto cut =
-        assembler_.lidar().cut(frame->window,
-                               {{reinterpret_cast<float(*)[4]>(scan_->points().data()), capacity},
-                                {scan_->point_offset_ns().data(), capacity},
-                                {scan_->point_line().data(), capacity}});
-    if (cut.count < kReturns * 9 / 10) std::abort();
-    for (std::size_t i = 0; i < frame->imu.size(); ++i) {
-      std::ranges::copy(frame->imu[i].gyro_rad_s, scan_->imu()[i].begin());
-    }
+    if (!sync_component::write_scan(*frame, assembler_.lidar(), *scan_)) std::abort();
+    if (scan_->points_count() < kReturns * 9 / 10) std::abort();
   }
 
   sync::FrameAssembler assembler_{sync::SyncConfig{}, sync::AssemblerOptions{}};

@@ -2,6 +2,8 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
+
 #include "camvox/component/fake_context.hpp"
 #include "sensor_streams.hpp"
 
@@ -266,6 +268,60 @@ TEST_F(SyncTest, SaysThatTheRigStandsStill) {
   ASSERT_EQ(scans().size(), 8U);
   EXPECT_EQ(scans()[0]->stationary(), 0);
   EXPECT_EQ(scans()[6]->stationary(), 1);
+}
+
+TEST_F(SyncTest, TakesAnImageOnceWhenBothTransportsCarryIt) {
+  make();
+  imu_between(0, 300);
+  scan_at(0);
+  image_at(100);
+  sensor_msgs::msg::CompressedImage compressed;
+  test::set_stamp(compressed, kStart_ns + 100 * kMs);
+  fake_.send("compressed_image", compressed);
+  EXPECT_EQ(images().size(), 1U);
+  EXPECT_EQ(counter("image.duplicates"), 1U);
+  EXPECT_EQ(counter("image.malformed"), 0U);
+}
+
+TEST_F(SyncTest, ReadsTheOlderLivoxDriver) {
+  fake_.set_parameter("depth_source", std::string("livox_interfaces"));
+  make();
+  imu_between(0, 300);
+  scan_at(0);
+  image_at(100);
+  ASSERT_EQ(scans().size(), 1U);
+  EXPECT_EQ(scans()[0]->points_count(), 100U);
+}
+
+TEST_F(SyncTest, ARollingShuttersFrameHasTheTimeOfItsMiddleRow) {
+  fake_.set_parameter("row_time_s", 1e-4);
+  make();
+  imu_between(0, 300);
+  scan_at(0);
+  scan_at(100);
+  image_at(150);
+  ASSERT_EQ(scans().size(), 1U);
+  EXPECT_EQ(scans()[0]->image_stamp_ns(), kStart_ns + 150 * kMs + 2'350'000);  // 23.5 rows
+}
+
+TEST_F(SyncTest, IgnoresImuSamplesThatAreNoNumbers) {
+  make();
+  auto broken = imu_message(kStart_ns);
+  broken.angular_velocity().x(std::nan(""));
+  fake_.send("imu", broken);
+  EXPECT_EQ(counter("imu.malformed"), 1U);
+  EXPECT_EQ(counter("imu.used"), 0U);
+}
+
+TEST_F(SyncTest, BadParametersStopTheStartWithAllProblems) {
+  fake_.set_parameter("camera.distortion", std::vector<double>(9, 0.0));
+  fake_.set_parameter("rig.T_imu_lidar.rotation_xyzw", std::vector<double>(4, 0.0));
+  try {
+    make();
+    FAIL();
+  } catch (const config::ConfigError& error) {
+    EXPECT_GE(error.problems().size(), 2U);
+  }
 }
 
 TEST_F(SyncTest, ReportsACameraThatIsNotTheConfiguredOne) {
