@@ -1,0 +1,101 @@
+#include "camvox/depth_component/depth_component.hpp"
+
+#include <array>
+#include <cmath>
+
+#include "camvox/conversion/pose.hpp"
+#include "edge_images.hpp"
+
+namespace camvox {
+namespace {
+
+constexpr Port kMetres{"depth", "/camvox/depth/image_raw"};
+constexpr Port kMillimetres{"depth_mm", "/camvox/depth/image_mm"};
+constexpr Port kCameraInfo{"camera_info", "/camvox/depth/camera_info"};
+
+/// Standard deviations per axis (rad, m) of a covariance: root of the mean variance.
+std::array<double, 2> sigmas_of(const geometry::Matrix6d& covariance) {
+  return {std::sqrt(covariance.topLeftCorner<3, 3>().trace() / 3.0),
+          std::sqrt(covariance.bottomRightCorner<3, 3>().trace() / 3.0)};
+}
+
+}  // namespace
+
+DepthComponent::DepthComponent(Context& context)
+    : context_(context),
+      config_(context.parameters<DepthComponentConfig>()),
+      projector_(sensors::CameraModel(config_.camera), config_.projector),
+      T_camera_lidar_(sensors::make_rig_calibration(config_.rig).T_camera_lidar()),
+      progress_(context),
+      depth_images_(context.advertise<DepthImage>({"depth_image", topics::kDepthImage},
+                                                  {.qos = qos::kFrames})),
+      metres_(context.advertise<Image>(kMetres, {.qos = qos::kSensorWriter})),
+      millimetres_(context.advertise<Image>(kMillimetres, {.qos = qos::kSensorWriter})),
+      camera_info_(context.advertise<CameraInfo>(kCameraInfo, {.qos = qos::kSensorWriter})) {
+  const auto pixels = std::int64_t{config_.camera.width_px} * config_.camera.height_px;
+  if (pixels > camvox_interfaces::msg::DEPTH_PIXELS) {
+    throw config::ConfigError({{{}, "camera", "more pixels than a depth image can hold"}});
+  }
+  context.subscribe<Extrinsics>({"extrinsics", topics::kExtrinsics},
+                                [this](const auto& extrinsics) { on_extrinsics(*extrinsics); },
+                                {.qos = qos::kState, .required = false});
+  context.subscribe<Cloud>({"cloud", topics::kCloud},
+                           [this](const auto& cloud) { on_cloud(*cloud); },
+                           {.qos = qos::kFrames});
+}
+
+void DepthComponent::on_extrinsics(const Extrinsics& extrinsics) {
+  if (extrinsics.applied() == 0 || extrinsics.version() <= extrinsics_version_) return;
+  T_camera_lidar_ = conversion::to_se3(extrinsics.T_camera_lidar());
+  extrinsics_version_ = extrinsics.version();
+  const auto [rotation_rad, translation_m] =
+      sigmas_of(conversion::to_matrix(extrinsics.covariance_lidar()));
+  if (std::isfinite(rotation_rad) && std::isfinite(translation_m)) {
+    projector_.set_extrinsics_sigma(rotation_rad, translation_m);
+  }
+  context_.log().info("extrinsics version {} from now on", extrinsics_version_);
+}
+
+void DepthComponent::on_cloud(const Cloud& cloud) {
+  const auto work = progress_.measure();
+  auto depth = depth_images_.loan();
+  depth->header() = cloud.header();
+  depth->extrinsics_version(extrinsics_version_);
+  depth->width_px(static_cast<std::uint32_t>(config_.camera.width_px));
+  depth->height_px(static_cast<std::uint32_t>(config_.camera.height_px));
+  if (cloud.points_count() > 0) {
+    const std::size_t pixels = std::size_t{depth->width_px()} * depth->height_px();
+    const depth::ScanView scan{{cloud.points()[0].data(), 4 * std::size_t{cloud.points_count()}},
+                               T_camera_lidar_};
+    const auto report = projector_.project(
+        {&scan, 1}, {depth->depth_m().data(), pixels}, {depth->sigma_m().data(), pixels});
+    depth->depth_m_count(static_cast<std::uint32_t>(pixels));
+    depth->sigma_m_count(static_cast<std::uint32_t>(pixels));
+    context_.diagnostics().set("returns", report.returns);
+    context_.diagnostics().set("returns in image", report.projected);
+    context_.diagnostics().set("pixels with depth", report.filled_px);
+  }
+  publish_edge_topics(*depth);
+  depth_images_.publish(std::move(depth));
+  progress_.done(cloud.header());
+}
+
+void DepthComponent::publish_edge_topics(const DepthImage& depth) {
+  if (metres_.subscriber_count() > 0) {
+    auto image = metres_.loan();
+    depth_component::write_metres(depth, *image);
+    metres_.publish(std::move(image));
+  }
+  if (millimetres_.subscriber_count() > 0) {
+    auto image = millimetres_.loan();
+    depth_component::write_millimetres(depth, *image);
+    millimetres_.publish(std::move(image));
+  }
+  if (camera_info_.subscriber_count() > 0) {
+    auto info = camera_info_.loan();
+    depth_component::write_camera_info(depth, config_.camera, *info);
+    camera_info_.publish(std::move(info));
+  }
+}
+
+}  // namespace camvox

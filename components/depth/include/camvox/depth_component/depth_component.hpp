@@ -1,0 +1,60 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "camvox/component/component.hpp"
+#include "camvox/component/progress.hpp"
+#include "camvox/depth/depth_projector.hpp"
+#include "camvox/interfaces/camvox_interfaces.hpp"
+#include "camvox/interfaces/sensor_msgs.hpp"
+#include "camvox/sensors/rig.hpp"
+
+namespace camvox {
+
+/// Parameters of DepthComponent.
+struct DepthComponentConfig {
+  depth::DepthProjectorConfig projector;
+  sensors::CameraIntrinsics camera;
+  sensors::RigConfig rig;  ///< T_lidar_camera, until a calibration says better.
+
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& field) {
+    field("projector", self.projector);
+    field("camera", self.camera);
+    field("rig", self.rig);
+  }
+};
+
+/// Projects each cloud into a depth image, straight into the memory that tracking reads. New
+/// extrinsics that passed their gate take effect with the next cloud; each image carries their
+/// version. While somebody reads them there are edge topics too: the depth as 32FC1 (m) and 16UC1
+/// (mm), with its CameraInfo.
+class DepthComponent final : public Component {
+ public:
+  explicit DepthComponent(Context& context);
+
+ private:
+  using Cloud = camvox_interfaces::msg::Cloud;
+  using DepthImage = camvox_interfaces::msg::DepthImage;
+  using Extrinsics = camvox_interfaces::msg::Extrinsics;
+  using Image = sensor_msgs::msg::Image;
+  using CameraInfo = sensor_msgs::msg::CameraInfo;
+
+  void on_extrinsics(const Extrinsics& extrinsics);
+  void on_cloud(const Cloud& cloud);
+  void publish_edge_topics(const DepthImage& depth);
+
+  Context& context_;
+  DepthComponentConfig config_;
+  depth::DepthProjector projector_;
+  geometry::SE3 T_camera_lidar_;
+  std::uint64_t extrinsics_version_ = 0;
+  ProgressReporter progress_;
+  Publisher<DepthImage> depth_images_;
+  Publisher<Image> metres_;
+  Publisher<Image> millimetres_;
+  Publisher<CameraInfo> camera_info_;
+};
+
+}  // namespace camvox

@@ -1,0 +1,3 @@
+#include "camvox/depth_component/depth_component.hpp"
+
+CAMVOX_REGISTER_COMPONENT(camvox::DepthComponent)

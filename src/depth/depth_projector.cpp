@@ -1,0 +1,173 @@
+#include "camvox/depth/depth_projector.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <stdexcept>
+
+#include "cell_grid.hpp"
+#include "hidden_returns.hpp"
+#include "mixed_cell.hpp"
+#include "plane_map.hpp"
+#include "point_projection.hpp"
+
+namespace camvox::depth {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180.0;
+
+NoiseModel make_noise(const sensors::CameraModel& camera, const DepthProjectorConfig& config) {
+  const double focal = std::sqrt(camera.intrinsics().fx_px * camera.intrinsics().fy_px);
+  return {config.range_sigma_m,
+          config.angle_sigma_deg * kDegree * focal,
+          config.extrinsics_sigma_deg * kDegree * focal,
+          config.extrinsics_sigma_m,
+          focal};
+}
+
+ProjectionBounds make_bounds(const DepthProjectorConfig& config) {
+  return {static_cast<float>(config.min_range_m),
+          static_cast<float>(config.max_range_m),
+          static_cast<float>(kMargin * kCell)};
+}
+
+MixedCellRule make_rule(const DepthProjectorConfig& config) {
+  return {static_cast<float>(config.fill_reach_px),
+          static_cast<float>(config.edge_margin_px),
+          static_cast<float>(config.surface_gap),
+          static_cast<float>(config.max_roughness)};
+}
+
+/// The pixels of a cell that lie in the image, and where.
+struct Block {
+  float* depth_m;
+  float* sigma_m;
+  std::size_t stride;
+  int width;
+  int height;
+};
+
+void write_plane(const CellPlane& plane, const Block& block) {
+  for (int v = 0; v < block.height; ++v) {
+    const float rho_row = plane.rho + plane.slope_v * (static_cast<float>(v) - 0.5F * (kCell - 1));
+    float* depth_m = block.depth_m + static_cast<std::size_t>(v) * block.stride;
+    float* sigma_m = block.sigma_m + static_cast<std::size_t>(v) * block.stride;
+    for (int u = 0; u < block.width; ++u) {
+      const float rho = rho_row + plane.slope_u * (static_cast<float>(u) - 0.5F * (kCell - 1));
+      const float z = 1.0F / rho;
+      depth_m[u] = z;
+      sigma_m[u] = plane.sigma_rho * z * z;
+    }
+  }
+}
+
+std::size_t write_pixels(const CellPixels& pixels, const Block& block) {
+  std::size_t filled = 0;
+  for (int v = 0; v < block.height; ++v) {
+    for (int u = 0; u < block.width; ++u) {
+      const auto from = static_cast<std::size_t>(v * kCell + u);
+      const auto to = static_cast<std::size_t>(v) * block.stride + static_cast<std::size_t>(u);
+      block.depth_m[to] = pixels.depth_m[from];
+      block.sigma_m[to] = pixels.sigma_m[from];
+      filled += static_cast<std::size_t>(pixels.depth_m[from] > 0.0F);
+    }
+  }
+  return filled;
+}
+
+/// The plane stays well in front of the camera over the whole cell.
+bool is_usable(const CellPlane& plane) {
+  const float change = 0.5F * kCell * (std::abs(plane.slope_u) + std::abs(plane.slope_v));
+  return plane.rho > 0.0F && change < 0.5F * plane.rho;
+}
+
+}  // namespace
+
+struct DepthProjector::Implementation {
+  Implementation(const sensors::CameraModel& camera, const DepthProjectorConfig& given)
+      : config(given),
+        width_px(camera.intrinsics().width_px),
+        height_px(camera.intrinsics().height_px),
+        noise(make_noise(camera, given)),
+        projection(camera, make_bounds(given)),
+        grid(width_px, height_px),
+        planes(camera) {}
+
+  std::size_t write(std::span<float> depth_m, std::span<float> sigma_m) {
+    MixedCellFiller filler(make_rule(config), noise);
+    CellPixels pixels;
+    std::size_t filled = 0;
+    const auto stride = static_cast<std::size_t>(width_px);
+    for (int row = kMargin; row < grid.rows() - kMargin; ++row) {
+      for (int column = kMargin; column < grid.columns() - kMargin; ++column) {
+        const int u = (column - kMargin) * kCell;
+        const int v = (row - kMargin) * kCell;
+        const auto offset = static_cast<std::size_t>(v) * stride + static_cast<std::size_t>(u);
+        const Block block{&depth_m[offset],
+                          &sigma_m[offset],
+                          stride,
+                          std::min(kCell, width_px - u),
+                          std::min(kCell, height_px - v)};
+        const std::size_t cell = grid.cell(column, row);
+        if (planes.kind(cell) == CellKind::kPlane && is_usable(planes.plane(cell))) {
+          write_plane(planes.plane(cell), block);
+          filled += static_cast<std::size_t>(block.width * block.height);
+        } else {
+          filler.fill(grid, planes, column, row, pixels);
+          filled += write_pixels(pixels, block);
+        }
+      }
+    }
+    return filled;
+  }
+
+  DepthProjectorConfig config;
+  int width_px;
+  int height_px;
+  NoiseModel noise;
+  PointProjection projection;
+  CellGrid grid;
+  PlaneMap planes;
+  ProjectedPoints points;
+};
+
+DepthProjector::DepthProjector(const sensors::CameraModel& camera,
+                               const DepthProjectorConfig& config) {
+  config::require_valid(config, "depth");
+  implementation_ = std::make_unique<Implementation>(camera, config);
+}
+DepthProjector::~DepthProjector() = default;
+DepthProjector::DepthProjector(DepthProjector&&) noexcept = default;
+DepthProjector& DepthProjector::operator=(DepthProjector&&) noexcept = default;
+
+ProjectionReport DepthProjector::project(std::span<const ScanView> scans,
+                                         std::span<float> depth_m,
+                                         std::span<float> sigma_m) {
+  Implementation& self = *implementation_;
+  const auto pixels =
+      static_cast<std::size_t>(self.width_px) * static_cast<std::size_t>(self.height_px);
+  if (depth_m.size() != pixels || sigma_m.size() != pixels) {
+    throw std::logic_error("DepthProjector: the images must have the size of the camera's");
+  }
+  ProjectionReport report;
+  self.points.resize(0);
+  for (const ScanView& scan : scans) {
+    report.returns += scan.points_lidar.size() / 4;
+    self.projection.append(scan.points_lidar, scan.T_camera_lidar, self.points);
+  }
+  report.projected = self.points.size();
+  self.grid.assign(self.points);
+  self.planes.fit(self.grid, self.noise);
+  const OcclusionRule rule{.surface_gap = static_cast<float>(self.config.surface_gap)};
+  report.hidden = hide_returns(self.planes, rule, self.grid);
+  if (report.hidden > 0) self.planes.fit(self.grid, self.noise);
+  report.filled_px = self.write(depth_m, sigma_m);
+  return report;
+}
+
+void DepthProjector::set_extrinsics_sigma(double rotation_rad, double translation_m) {
+  implementation_->noise.extrinsics_sigma_px = rotation_rad * implementation_->noise.focal_px;
+  implementation_->noise.extrinsics_sigma_m = translation_m;
+}
+
+}  // namespace camvox::depth
