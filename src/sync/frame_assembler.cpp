@@ -7,6 +7,7 @@ namespace camvox::sync {
 namespace {
 
 constexpr std::size_t kMaxBufferedSamples = 1U << 14;  // 16 s at 1 kHz
+constexpr std::int64_t kLockstepGap_ns = 5'000'000;    // waiting costs nothing; a lost packet does
 constexpr double kLockstepStall_s = 10.0;              // nothing moves any more
 
 std::int64_t window_begin(const SyncConfig& config) {
@@ -90,18 +91,13 @@ void FrameAssembler::set_newest_depth(std::int64_t driver_stamp_ns, std::int64_t
 
 LidarWindow FrameAssembler::window_of(std::int64_t stamp_ns) const {
   const std::int64_t begin_ns = stamp_ns + window_begin_ns_;
+  const std::int64_t gap_ns = to_ns(config_.max_lidar_gap_s);
   return {begin_ns,
           begin_ns + window_ns_,
           stamp_ns,
           to_ns(config_.boundary_tolerance_s),
-          to_ns(config_.max_lidar_gap_s)};
-}
-
-bool FrameAssembler::lidar_reaches(const LidarWindow& window) const {
-  if (lidar_.covers(window)) return true;
-  // A gap that is still there so much later stays.
-  const auto newest_ns = lidar_.newest_ns();
-  return newest_ns && *newest_ns >= window.end_ns + to_ns(config_.max_wait_s);
+          options_.lockstep ? std::min(gap_ns, kLockstepGap_ns) : gap_ns,
+          to_ns(config_.max_wait_s)};
 }
 
 bool FrameAssembler::imu_reaches(const LidarWindow& window) const {
@@ -134,7 +130,7 @@ std::optional<Frame> FrameAssembler::take_ready(std::int64_t now_ns) {
   if (pending_.empty()) return std::nullopt;
   const auto& next = pending_.front();
   Frame frame{next.stamp_ns, window_of(next.stamp_ns), {}, false, false};
-  frame.has_lidar = options_.use_lidar && lidar_reaches(frame.window);
+  frame.has_lidar = options_.use_lidar && lidar_.is_settled(frame.window);
   frame.has_imu = options_.use_lidar && config_.use_imu && imu_reaches(frame.window);
   const bool has_depth = newest_depth_ns_ >= next.stamp_ns;
   const bool missing = (lidar_alive_.alive && !frame.has_lidar) ||

@@ -17,6 +17,10 @@ std::size_t count_inside(const LidarChunk& chunk, std::int64_t begin_ns, std::in
   }));
 }
 
+bool is_too_late(const LidarChunk& chunk, const LidarWindow& window) {
+  return chunk.newest_before_ns >= window.end_ns + window.max_wait_ns;
+}
+
 /// Appends the returns of one chunk that lie in the window; offsets count from `origin_ns`.
 std::size_t append(const LidarChunk& chunk,
                    std::int64_t begin_ns,
@@ -69,7 +73,10 @@ bool LidarBuffer::add(LidarChunk&& chunk) {
     return false;
   }
   if (verdict != StampVerdict::kEarlier) extend_to_period(chunk);
-  counters_.reordered += verdict == StampVerdict::kEarlier ? 1 : 0;
+  if (verdict == StampVerdict::kEarlier) {
+    ++counters_.reordered;
+    chunk.newest_before_ns = newest_ns_.value_or(chunk.end_ns);
+  }
   ++counters_.used;
   newest_ns_ = std::max(newest_ns_.value_or(chunk.end_ns), chunk.end_ns);
   total_returns_ += chunk.returns.size();
@@ -126,11 +133,16 @@ std::int64_t LidarBuffer::snapped(std::int64_t time_ns, std::int64_t tolerance_n
   return near ? next->stamp_ns : time_ns;
 }
 
+bool LidarBuffer::is_settled(const LidarWindow& window) const {
+  return covers(window) || (newest_ns_ && *newest_ns_ >= window.end_ns + window.max_wait_ns);
+}
+
 bool LidarBuffer::covers(const LidarWindow& window) const {
   const std::int64_t begin_ns = snapped(window.begin_ns, window.tolerance_ns);
   const std::int64_t end_ns = snapped(window.end_ns, window.tolerance_ns) - window.tolerance_ns;
   std::int64_t covered_ns = begin_ns;
   for (const auto& chunk : chunks_) {
+    if (is_too_late(chunk, window)) continue;
     if (chunk.stamp_ns - covered_ns > window.max_gap_ns && chunk.has_point_times) return false;
     covered_ns = std::max(covered_ns, chunk.end_ns);
     if (covered_ns >= end_ns) return true;
@@ -143,7 +155,7 @@ const LidarChunk* LidarBuffer::nearest_untimed(const LidarWindow& window) const 
   std::int64_t best_ns = window.end_ns - window.begin_ns;
   for (const auto& chunk : chunks_) {
     const std::int64_t distance_ns = std::abs(chunk.stamp_ns - window.image_ns);
-    if (chunk.has_point_times || distance_ns >= best_ns) continue;
+    if (chunk.has_point_times || distance_ns >= best_ns || is_too_late(chunk, window)) continue;
     best_ns = distance_ns;
     nearest = &chunk;
   }
@@ -171,6 +183,7 @@ ScanCut LidarBuffer::cut(const LidarWindow& window, const ScanLists& lists) cons
   std::size_t count = 0;
   for (const auto& chunk : chunks_) {
     if (!chunk.has_point_times || chunk.end_ns < begin_ns || chunk.stamp_ns >= end_ns) continue;
+    if (is_too_late(chunk, window)) continue;
     const std::size_t room = lists.points.size() - count;
     if (chunk.returns.size() > room && count_inside(chunk, begin_ns, end_ns) > room) {
       return {begin_ns, 0, true};

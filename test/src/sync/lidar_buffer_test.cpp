@@ -29,7 +29,7 @@ LidarChunk chunk_at(std::int64_t ms, std::int64_t duration_ms = 10) {
 }
 
 LidarWindow window(std::int64_t begin_ms, std::int64_t end_ms) {
-  return {begin_ms * kMs, end_ms * kMs, end_ms * kMs, 2 * kMs, 30 * kMs};
+  return {begin_ms * kMs, end_ms * kMs, end_ms * kMs, 2 * kMs, 30 * kMs, 150 * kMs};
 }
 
 /// Lists of a scan.
@@ -115,6 +115,20 @@ TEST(LidarBuffer, CoversOnlyWhatHasNoGap) {
   EXPECT_TRUE(buffer.covers(window(0, 120)));
 }
 
+// What a window holds depends on the lidar's messages alone, not on when it is cut.
+TEST(LidarBuffer, AChunkThatComesTooLateIsNotForAWindowThatIsSettled) {
+  LidarBuffer buffer(kSecond, 1'000'000);
+  buffer.add(chunk_at(0, 100));
+  buffer.add(chunk_at(200, 100));
+  EXPECT_FALSE(buffer.is_settled(window(100, 200)));  // 300 - 200 is less than 150
+  EXPECT_TRUE(buffer.is_settled(window(50, 149)));
+  buffer.add(chunk_at(100, 100));
+  Lists lists(2000);
+  EXPECT_EQ(buffer.cut(window(100, 200), lists.view).count, 1000U);
+  EXPECT_EQ(buffer.cut(window(50, 149), lists.view).count, 500U);
+  EXPECT_TRUE(buffer.is_settled(window(100, 200)));
+}
+
 TEST(LidarBuffer, WindowsEndMovesToAMessagesBoundaryNearBy) {
   LidarBuffer early(kSecond, 1'000'000), late(kSecond, 1'000'000);
   for (auto* buffer : {&early, &late}) buffer->add(chunk_at(0, 99));
@@ -145,7 +159,7 @@ TEST(LidarBuffer, UntimedCloudsGoWholeToTheNearestImage) {
     buffer.add(std::move(chunk));
   }
   Lists lists(1000);
-  const auto cut = buffer.cut({30 * kMs, 130 * kMs, 130 * kMs, 0, 30 * kMs}, lists.view);
+  const auto cut = buffer.cut({30 * kMs, 130 * kMs, 130 * kMs, 0, 30 * kMs, 150 * kMs}, lists.view);
   EXPECT_EQ(cut.count, 100U);
   EXPECT_EQ(cut.stamp_ns, 100 * kMs);
   EXPECT_EQ(lists.offsets[99], 0U);
@@ -172,7 +186,9 @@ TEST(LidarBuffer, MemoryIsBoundedAndReused) {
 
 TEST(LidarBuffer, EmptyChunksAreFine) {
   LidarBuffer buffer(kSecond, 5000);
-  EXPECT_TRUE(buffer.add({10 * kMs, 10 * kMs, true, {}}));
+  LidarChunk empty;
+  empty.stamp_ns = empty.end_ns = 10 * kMs;
+  EXPECT_TRUE(buffer.add(std::move(empty)));
   Lists lists(10);
   const auto cut = buffer.cut(window(0, 100), lists.view);
   EXPECT_EQ(cut.count, 0U);

@@ -99,7 +99,6 @@ class FrameAssembler {
   };
 
   [[nodiscard]] LidarWindow window_of(std::int64_t stamp_ns) const;
-  [[nodiscard]] bool lidar_reaches(const LidarWindow& window) const;
   [[nodiscard]] bool imu_reaches(const LidarWindow& window) const;
   [[nodiscard]] bool waited_enough(const Pending& frame, std::int64_t now_ns) const;
   void give_up(Liveness& sensor, std::int64_t now_ns) const;

@@ -28,6 +28,7 @@ struct LidarChunk {
   std::int64_t end_ns = 0;      ///< Of the last return; stamp_ns when there is none.
   bool has_point_times = true;  ///< False: all returns carry the stamp, for want of better.
   std::vector<LidarReturn> returns;
+  std::int64_t newest_before_ns = INT64_MIN;  ///< Set by the buffer if the chunk came late.
 };
 
 /// Where a cut writes: the lists of a message. All spans have the same length.
@@ -52,6 +53,9 @@ struct LidarWindow {
   std::int64_t image_ns = 0;      ///< For chunks without point times.
   std::int64_t tolerance_ns = 0;  ///< Either end moves back to a chunk's beginning this near.
   std::int64_t max_gap_ns = 0;    ///< Between two returns, or chunks, before data are missing.
+  /// Data behind the end by this much settle what the window holds: chunks that come later are not
+  /// for it any more, whether it was cut by then or not.
+  std::int64_t max_wait_ns = INT64_MAX / 4;
 };
 
 /// Keeps the latest returns of a lidar so that any interval of time can be cut out of them,
@@ -75,6 +79,8 @@ class LidarBuffer {
 
   /// End of the latest data.
   [[nodiscard]] std::optional<std::int64_t> newest_ns() const { return newest_ns_; }
+  /// Whether it is settled what the window holds: all is there without a gap, or comes too late.
+  [[nodiscard]] bool is_settled(const LidarWindow& window) const;
   /// Whether the data of the window are all there, without a gap.
   [[nodiscard]] bool covers(const LidarWindow& window) const;
   /// Writes the returns of the window. Of chunks without point times the one nearest to the image
