@@ -24,7 +24,7 @@ constexpr float kInlierSigmas = 3.5F;
 /// How far a neighbour's plane may be off, as a share of depth, beside the noise.
 constexpr float kPlaneTolerance = 0.004F;
 /// A surface may go on this far beyond its outermost returns.
-const float kBeyond_px = getenv("BEYOND")?(float)atof(getenv("BEYOND")):1.5F;
+const float kBeyond_px = getenv("BEYOND") ? (float)atof(getenv("BEYOND")) : 1.5F;
 /// A return without a surface stands for itself this far.
 constexpr float kLoneReach_px = 1.5F;
 /// Slope of a lone return's surface, as that of an incidence of 63 degrees.
@@ -226,7 +226,8 @@ void MixedCellFiller::measure(const Surface& surface, Distances& distances) cons
   }
 }
 
-/// Gives the pixels to `surface` that it is nearest to so far, its depth included if it may have one.
+/// Gives the pixels to `surface` that it is nearest to so far, its depth included if it may have
+/// one.
 CAMVOX_TARGET_CLONES
 void MixedCellFiller::merge(const Surface& surface, const Distances& distances, Nearest& nearest) {
   const CellPlane plane = surface.plane;
@@ -276,11 +277,8 @@ void MixedCellFiller::decide(const Nearest& nearest, CellPixels& pixels) const {
   }
 }
 
-void MixedCellFiller::fill(const CellGrid& grid,
-                           const PlaneMap& planes,
-                           int column,
-                           int row,
-                           CellPixels& pixels) {
+void MixedCellFiller::fill(
+    const CellGrid& grid, const PlaneMap& planes, int column, int row, CellPixels& pixels) {
   const std::size_t cell = grid.cell(column, row);
   u_middle_ = PlaneMap::middle_px(column);
   v_middle_ = PlaneMap::middle_px(row);

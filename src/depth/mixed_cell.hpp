@@ -44,7 +44,7 @@ class MixedCellFiller {
     std::size_t end;
     CellPlane plane;
     float reach_px;
-    std::array<float, 4> low;   ///< The octagon around the returns: u, v, u + v, u - v.
+    std::array<float, 4> low;  ///< The octagon around the returns: u, v, u + v, u - v.
     std::array<float, 4> high;
   };
   using Distances = std::array<float, kCell * kCell>;

@@ -36,12 +36,12 @@ inline constexpr double kPriorReturns = 6.0;
 /// Steepest surface to expect: d rho / d px = this * rho / f (tangent of the incidence angle).
 inline constexpr double kSteepest = 20.0;
 /// Relief that the scatter of the returns does not show, as a share of their noise.
-inline double kRelief = getenv("RELIEF")?atof(getenv("RELIEF")):0.4;
-inline double kExcess = getenv("EXC")?atof(getenv("EXC")):1.0;
-inline double kRough = getenv("ROUGH")?atof(getenv("ROUGH")):0.005;
+inline double kRelief = getenv("RELIEF") ? atof(getenv("RELIEF")) : 0.4;
+inline double kExcess = getenv("EXC") ? atof(getenv("EXC")) : 1.0;
+inline double kRough = getenv("ROUGH") ? atof(getenv("ROUGH")) : 0.005;
 /// Error of direction that returns of one place have in common (the beam has a width, and the
 /// nearer part of a slope answers more strongly), as a share of their noise.
-inline double kPointingBias = getenv("POINT")?atof(getenv("POINT")):0.3;
+inline double kPointingBias = getenv("POINT") ? atof(getenv("POINT")) : 0.3;
 /// No surface is flatter than this share of its depth.
 inline constexpr double kUnevenness = 0.0005;
 

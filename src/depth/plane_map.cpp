@@ -17,7 +17,8 @@ constexpr double kMostOffCentre2 = 1.0;
 using Moment = CellGrid::Moment;
 
 bool is_plane(const PlaneFit& fit, double least) {
-  return fit.count >= least && fit.off_centre2 <= kMostOffCentre2 && (agrees_with_noise(fit) || is_even(fit));
+  return fit.count >= least && fit.off_centre2 <= kMostOffCentre2 &&
+         (agrees_with_noise(fit) || is_even(fit));
 }
 
 CellPlane to_plane(const PlaneFit& fit) {
@@ -112,8 +113,7 @@ void PlaneMap::fit(const CellGrid& grid, const NoiseModel& noise) {
       const std::size_t cell = grid.cell(column, row);
       const auto i = static_cast<std::size_t>(column);
       planes_[cell] = fits.planes[i];
-      const bool plane = fits.accepted[i] != 0 ||
-                         try_cell_alone(grid, column, row, noise);
+      const bool plane = fits.accepted[i] != 0 || try_cell_alone(grid, column, row, noise);
       kinds_[cell] = plane ? CellKind::kPlane : CellKind::kMixed;
     }
   }

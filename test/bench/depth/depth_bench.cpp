@@ -107,8 +107,10 @@ void run(DepthProjector& projector,
   for (std::size_t i = 0; i < depth_m.size(); ++i) {
     const float z = scene.truth.z_m[i];
     if (depth_m[i] <= 0.0F) continue;
-    totals.gross_behind += z > 0.0F && depth_m[i] > 1.03F * z && depth_m[i] > z + 3 * sigma_m[i] ? 1 : 0;
-    totals.gross_front += (z <= 0.0F || depth_m[i] < 0.97F * z) && depth_m[i] < z - 3 * sigma_m[i] ? 1 : 0;
+    totals.gross_behind +=
+        z > 0.0F && depth_m[i] > 1.03F * z && depth_m[i] > z + 3 * sigma_m[i] ? 1 : 0;
+    totals.gross_front +=
+        (z <= 0.0F || depth_m[i] < 0.97F * z) && depth_m[i] < z - 3 * sigma_m[i] ? 1 : 0;
   }
   totals.returns += report.returns;
   totals.hidden += report.hidden;
@@ -159,7 +161,8 @@ int main(int argc, char** argv) {
       "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n");
   for (const char* name : {"loop_400m", "demo", "corridor"}) {
     camvox::test::DepthSceneMaker maker(camvox::simulation::preset(name));
-    DepthProjector projector(maker.camera(), {.extrinsics_sigma_deg = 0.0, .extrinsics_sigma_m = 0.0});
+    DepthProjector projector(maker.camera(),
+                             {.extrinsics_sigma_deg = 0.0, .extrinsics_sigma_m = 0.0});
     Totals totals;
     for (int i = 0; i < frames; ++i) {
       run(projector,

@@ -1,0 +1,3 @@
+#include "camvox/mapping_component/mapping_component.hpp"
+
+CAMVOX_REGISTER_COMPONENT(camvox::MappingComponent)

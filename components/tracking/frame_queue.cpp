@@ -1,0 +1,70 @@
+#include "camvox/tracking_component/frame_queue.hpp"
+
+namespace camvox::tracking_component {
+
+namespace msg = camvox_interfaces::msg;
+
+void FrameQueue::add(const Sample<msg::FrameImage>& image) {
+  if (auto* inputs = slot(image->header().frame_id())) inputs->image = image;
+}
+
+void FrameQueue::add(const Sample<msg::DepthImage>& depth) {
+  if (auto* inputs = slot(depth->header().frame_id())) inputs->depth = depth;
+}
+
+void FrameQueue::add(const Sample<msg::Cloud>& cloud) {
+  if (auto* inputs = slot(cloud->header().frame_id())) inputs->cloud = cloud;
+}
+
+/// Nothing for a frame that is over.
+FrameInputs* FrameQueue::slot(std::uint64_t frame_id) {
+  if (frame_id <= last_taken_) return nullptr;
+  auto* inputs = &frames_[frame_id];
+  if (frames_.size() > kCapacity) {
+    if (frames_.begin()->first == frame_id) inputs = nullptr;
+    drop_oldest();
+  }
+  return inputs;
+}
+
+void FrameQueue::drop_oldest() {
+  if (frames_.begin()->second.image) ++dropped_;
+  frames_.erase(frames_.begin());
+}
+
+bool FrameQueue::complete(const FrameInputs& inputs) const {
+  return inputs.image && inputs.depth && (inputs.cloud || !needs_cloud_);
+}
+
+std::optional<std::uint64_t> FrameQueue::next() const {
+  if (keep_all_) {
+    // Ids without a gap: the next is known. After a gap the oldest complete one will do, once
+    // something newer shows that the stream has gone on.
+    for (const auto& [id, inputs] : frames_) {
+      if (!complete(inputs)) return std::nullopt;
+      return id;
+    }
+    return std::nullopt;
+  }
+  std::optional<std::uint64_t> newest;
+  for (const auto& [id, inputs] : frames_) {
+    if (complete(inputs)) newest = id;
+  }
+  if (!newest) return std::nullopt;
+  // An older frame that lacks only its depth was waited for long enough: it goes first.
+  for (const auto& [id, inputs] : frames_) {
+    if (id >= *newest) break;
+    if (inputs.image && !inputs.depth) return id;
+  }
+  return newest;
+}
+
+FrameInputs FrameQueue::take(std::uint64_t frame_id) {
+  while (!frames_.empty() && frames_.begin()->first < frame_id) drop_oldest();
+  FrameInputs inputs = std::move(frames_.begin()->second);
+  frames_.erase(frames_.begin());
+  last_taken_ = frame_id;
+  return inputs;
+}
+
+}  // namespace camvox::tracking_component

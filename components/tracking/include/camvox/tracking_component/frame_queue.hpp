@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+
+#include "camvox/component/sample.hpp"
+#include "camvox/interfaces/camvox_interfaces.hpp"
+
+namespace camvox::tracking_component {
+
+/// What belongs to one frame; each comes on its own topic, in any order.
+struct FrameInputs {
+  std::optional<Sample<camvox_interfaces::msg::FrameImage>> image;
+  std::optional<Sample<camvox_interfaces::msg::DepthImage>> depth;
+  std::optional<Sample<camvox_interfaces::msg::Cloud>> cloud;
+};
+
+/// Collects the inputs of frames by their id and hands them out in order.
+class FrameQueue {
+ public:
+  /// At most so many frames are held; the oldest goes when one more comes.
+  static constexpr std::size_t kCapacity = 5;
+
+  FrameQueue(bool needs_cloud, bool keep_all) : needs_cloud_(needs_cloud), keep_all_(keep_all) {}
+
+  void add(const Sample<camvox_interfaces::msg::FrameImage>& image);
+  void add(const Sample<camvox_interfaces::msg::DepthImage>& depth);
+  void add(const Sample<camvox_interfaces::msg::Cloud>& cloud);
+
+  /// Id of the next frame to work on, if there is one: the oldest complete one, once no older frame
+  /// can become complete first (keep_all); else the newest complete one.
+  [[nodiscard]] std::optional<std::uint64_t> next() const;
+  /// Takes a frame out. Older ones are dropped: without an image silently, the others counted.
+  [[nodiscard]] FrameInputs take(std::uint64_t frame_id);
+
+  [[nodiscard]] std::uint64_t dropped() const { return dropped_; }
+
+ private:
+  [[nodiscard]] FrameInputs* slot(std::uint64_t frame_id);
+  [[nodiscard]] bool complete(const FrameInputs& inputs) const;
+  void drop_oldest();
+
+  bool needs_cloud_;
+  bool keep_all_;
+  std::map<std::uint64_t, FrameInputs> frames_;
+  std::uint64_t last_taken_ = 0;
+  std::uint64_t dropped_ = 0;
+};
+
+}  // namespace camvox::tracking_component

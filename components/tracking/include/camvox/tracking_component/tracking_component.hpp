@@ -1,0 +1,83 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+
+#include "camvox/component/component.hpp"
+#include "camvox/component/progress.hpp"
+#include "camvox/interfaces/camvox_interfaces.hpp"
+#include "camvox/interfaces/nav_msgs.hpp"
+#include "camvox/interfaces/tf2_msgs.hpp"
+#include "camvox/sensors/rig.hpp"
+#include "camvox/tracking/frame_builder.hpp"
+#include "camvox/tracking/tracker.hpp"
+#include "camvox/tracking_component/frame_queue.hpp"
+#include "camvox/tracking_component/odometry_output.hpp"
+
+namespace camvox {
+
+/// Parameters of TrackingComponent.
+struct TrackingComponentConfig {
+  /// Process every frame in order, each on the map that was made of the frame before.
+  bool lockstep = false;
+  bool wait_for_map = true;  ///< In lockstep; false where no mapping runs.
+  bool use_imu = true;       ///< Wait for the cloud of a frame too: it brings the gyro's rotation.
+  tracking::TrackerConfig tracker;
+  tracking::FrameBuilderConfig frame;
+  sensors::CameraIntrinsics camera;
+  sensors::RigConfig rig;
+
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& field) {
+    field("lockstep", self.lockstep);
+    field("wait_for_map", self.wait_for_map);
+    field("use_imu", self.use_imu);
+    field("tracker", self.tracker);
+    field("frame", self.frame);
+    field("camera", self.camera);
+    field("rig", self.rig);
+  }
+};
+
+/// Follows the camera: the pose of every frame, keyframes, odometry and transforms (see
+/// tracking::Tracker). Live, the newest complete frame counts and what it overtakes is dropped and
+/// counted; a frame whose depth does not come is tracked without when the next one is complete.
+class TrackingComponent final : public Component {
+ public:
+  explicit TrackingComponent(Context& context);
+
+ private:
+  using LocalMap = camvox_interfaces::msg::LocalMap;
+  using Answer = camvox_interfaces::msg::RelocalisationAnswer;
+  using FrameInputs = tracking_component::FrameInputs;
+
+  void on_map(const LocalMap& map);
+  void on_answer(const Answer& answer);
+  void process_ready();
+  [[nodiscard]] bool may_process(std::uint64_t frame_id) const;
+  void process(const FrameInputs& inputs);
+  [[nodiscard]] tracking::Frame make_frame(const FrameInputs& inputs);
+  void publish(tracking::FrameResult& result, double time_s);
+  void publish_keyframe(const tracking::Keyframe& keyframe,
+                        Publisher<camvox_interfaces::msg::Keyframe>& publisher);
+  void report(const tracking::FrameResult& result);
+
+  Context& context_;
+  TrackingComponentConfig config_;
+  sensors::RigCalibration rig_;
+  geometry::SO3 R_camera_imu_;
+  tracking::FrameBuilder builder_;
+  tracking::Tracker tracker_;
+  tracking_component::FrameQueue queue_;
+  tracking_component::OdometryOutput odometry_;
+  ProgressReporter progress_;
+  Publisher<camvox_interfaces::msg::FramePose> poses_;
+  Publisher<camvox_interfaces::msg::Keyframe> keyframes_;
+  Publisher<camvox_interfaces::msg::Keyframe> requests_;
+  std::uint64_t last_frame_id_ = 0;
+  std::uint64_t map_frame_id_ = 0;  ///< Of the newest local map.
+  std::uint64_t keyframes_sent_ = 0;
+};
+
+}  // namespace camvox

@@ -1,0 +1,185 @@
+#include "camvox/tracking_component/tracking_component.hpp"
+
+#include <cmath>
+
+#include "camvox/conversion/image.hpp"
+#include "camvox/conversion/map_messages.hpp"
+#include "camvox/conversion/pose.hpp"
+
+namespace camvox {
+namespace {
+
+namespace msg = camvox_interfaces::msg;
+using tracking::TrackingState;
+
+/// Rotation from this camera frame to the one before, from what the gyro says in the IMU's axes.
+std::optional<geometry::SO3> camera_rotation(const std::array<double, 4>& rotation_imu,
+                                             const geometry::SO3& R_camera_imu) {
+  const Eigen::Quaterniond q(rotation_imu[3], rotation_imu[0], rotation_imu[1], rotation_imu[2]);
+  if (std::abs(q.norm() - 1.0) > 1e-3) return std::nullopt;  // 0 0 0 0: not known
+  return R_camera_imu * geometry::SO3(q) * R_camera_imu.inverse();
+}
+
+}  // namespace
+
+TrackingComponent::TrackingComponent(Context& context)
+    : context_(context),
+      config_(context.parameters<TrackingComponentConfig>()),
+      rig_(sensors::make_rig_calibration(config_.rig)),
+      R_camera_imu_((rig_.T_imu_lidar * rig_.T_lidar_camera).inverse().rotation()),
+      builder_(config_.frame, config_.camera),
+      tracker_(config_.tracker, builder_.tracking_camera(), rig_.T_body_camera),
+      queue_(config_.use_imu, config_.lockstep),
+      odometry_(context, rig_.T_body_camera),
+      progress_(context),
+      poses_(context.advertise<msg::FramePose>({"frame_pose", topics::kFramePose},
+                                               {.qos = qos::kKeyframes})),
+      keyframes_(context.advertise<msg::Keyframe>({"keyframe", topics::kKeyframe},
+                                                  {.qos = qos::kKeyframes})),
+      requests_(context.advertise<msg::Keyframe>(
+          {"relocalisation_request", topics::kRelocalisationRequest})) {
+  constexpr int kHeld = static_cast<int>(tracking_component::FrameQueue::kCapacity) + 1;
+  const auto collect = [this](const auto& sample) {
+    const auto work = progress_.measure();
+    queue_.add(sample);
+    process_ready();
+  };
+  context.subscribe<msg::FrameImage>(
+      {"frame_image", topics::kFrameImage}, collect, {.qos = qos::kFrames, .max_held = kHeld});
+  context.subscribe<msg::DepthImage>(
+      {"depth_image", topics::kDepthImage}, collect, {.qos = qos::kFrames, .max_held = kHeld});
+  if (config_.use_imu) {
+    context.subscribe<msg::Cloud>(
+        {"cloud", topics::kCloud}, collect, {.qos = qos::kFrames, .max_held = kHeld});
+  }
+  context.subscribe<msg::LocalMap>(
+      {"local_map", topics::kLocalMap},
+      [this](const auto& map) { on_map(*map); },
+      {.qos = qos::kFrames, .required = config_.lockstep && config_.wait_for_map});
+  context.subscribe<msg::RelocalisationAnswer>(
+      {"relocalisation_answer", topics::kRelocalisationAnswer},
+      [this](const auto& answer) { on_answer(*answer); },
+      {.required = false});
+}
+
+void TrackingComponent::on_map(const LocalMap& map) {
+  const auto work = progress_.measure();
+  if (map.header().frame_id() >= map_frame_id_) {  // one that was overtaken says nothing new
+    map_frame_id_ = map.header().frame_id();
+    tracker_.update_map(conversion::read_local_map(map));
+  }
+  process_ready();
+}
+
+void TrackingComponent::on_answer(const Answer& answer) {
+  const auto frame_id = answer.header().frame_id();
+  if (answer.found() == 0 || answer.keyframe_ids_count() == 0) {
+    tracker_.relocalisation_failed(frame_id);
+    return;
+  }
+  tracker_.relocalise({frame_id,
+                       answer.map_epoch(),
+                       answer.keyframe_ids()[0],
+                       conversion::to_se3(answer.T_map_camera())});
+}
+
+void TrackingComponent::process_ready() {
+  for (auto id = queue_.next(); id && may_process(*id); id = queue_.next()) {
+    process(queue_.take(*id));
+  }
+}
+
+bool TrackingComponent::may_process(std::uint64_t) const {
+  const bool waits = config_.lockstep && config_.wait_for_map && last_frame_id_ != 0;
+  return !waits || map_frame_id_ >= last_frame_id_;
+}
+
+void TrackingComponent::process(const FrameInputs& inputs) {
+  const double started_s = thread_processor_time_s();
+  const auto header = (*inputs.image)->header();
+  last_frame_id_ = header.frame_id();
+  auto result = tracker_.track(make_frame(inputs));
+  publish(result, thread_processor_time_s() - started_s);
+  report(result);
+  progress_.done(header);
+}
+
+tracking::Frame TrackingComponent::make_frame(const FrameInputs& inputs) {
+  const auto& image = **inputs.image;
+  tracking::Frame frame;
+  frame.frame_id = image.header().frame_id();
+  frame.stamp_ns = image.header().stamp_ns();
+  const auto grey = conversion::grey_view(image);
+  if (!grey) {
+    throw std::runtime_error(
+        "frame image without a grey plane: set sync's encoding to mono8 or "
+        "yuv420");
+  }
+  depth::DepthView depth;
+  if (inputs.depth && (*inputs.depth)->depth_m_count() > 0) {
+    const auto& message = **inputs.depth;
+    depth = {message.depth_m().data(),
+             message.sigma_m().data(),
+             static_cast<int>(message.width_px()),
+             static_cast<int>(message.height_px())};
+  }
+  frame.features = builder_.build({grey->data,
+                                   grey->width_px,
+                                   grey->height_px,
+                                   static_cast<std::ptrdiff_t>(grey->row_step_bytes)},
+                                  depth);
+  if (inputs.cloud) {
+    frame.R_previous_camera = camera_rotation((*inputs.cloud)->rotation_imu(), R_camera_imu_);
+  }
+  return frame;
+}
+
+void TrackingComponent::publish(tracking::FrameResult& result, double time_s) {
+  if (result.keyframe) publish_keyframe(*result.keyframe, keyframes_);
+  if (result.relocalisation_request) publish_keyframe(*result.relocalisation_request, requests_);
+  if (result.keyframe) ++keyframes_sent_;
+  auto pose = poses_.loan();
+  conversion::write_frame_pose(result, *pose);
+  pose->processing_time_s(static_cast<float>(time_s));
+  poses_.publish(std::move(pose));
+  if (result.has_pose()) odometry_.publish(result);
+}
+
+void TrackingComponent::publish_keyframe(const tracking::Keyframe& keyframe,
+                                         Publisher<msg::Keyframe>& publisher) {
+  auto message = publisher.loan();
+  if (!conversion::write_keyframe(keyframe, *message)) {
+    context_.log().error("a frame of {} features does not fit a keyframe; lower frame.extractor",
+                         keyframe.features.size());
+    return;
+  }
+  publisher.publish(std::move(message));
+}
+
+void TrackingComponent::report(const tracking::FrameResult& result) {
+  constexpr std::array kNames = {"waiting", "ok", "lost", "relocalising", "localisation only"};
+  auto& diagnostics = context_.diagnostics();
+  const auto& statistics = result.statistics;
+  diagnostics.set("state", kNames.at(static_cast<std::size_t>(result.state)));
+  const auto count = [&diagnostics](std::string_view key, int value) {
+    diagnostics.set(key, static_cast<std::uint64_t>(value));
+  };
+  count("features", statistics.features);
+  count("features with depth", statistics.features_with_depth);
+  count("matches", statistics.matches);
+  count("inliers", statistics.inliers);
+  diagnostics.set("chi2 per row", statistics.chi2_per_row);
+  diagnostics.set("keyframes", keyframes_sent_);
+  diagnostics.set("dropped frames", queue_.dropped());
+  if (result.state == TrackingState::kLost || result.state == TrackingState::kRelocalising) {
+    diagnostics.report(HealthLevel::kError, "lost");
+  } else if (result.has_pose() && statistics.inliers * 3 < statistics.matches) {
+    diagnostics.report(HealthLevel::kWarn,
+                       "few matches agree with the pose: is the calibration "
+                       "right?");
+  } else {
+    diagnostics.report(HealthLevel::kOk, "ok");
+  }
+}
+
+}  // namespace camvox

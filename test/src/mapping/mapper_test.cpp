@@ -1,0 +1,295 @@
+#include "camvox/mapping/mapper.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+#include "mapping_world.hpp"
+
+namespace camvox::mapping {
+namespace {
+
+using geometry::SE3;
+
+TEST(MapperTest, PutsNoisyKeyframesWhereTheyWereTaken) {
+  MappingWorld world;
+  const Mapper mapper = drive(world, 15);
+  mapper.map().check_consistency();
+  // Tracking was 5 cm off (1 sigma, each axis) each time; hundreds of points average that down.
+  EXPECT_LT(worst_position_m(mapper, world), 0.03);
+  EXPECT_GT(mapper.map().landmark_count(), 300U);
+  std::vector<double> errors_m;
+  for (const auto id : mapper.map().landmark_ids()) {
+    const auto& landmark = mapper.map().landmark(id);
+    if (landmark.observations.size() < 3) continue;
+    const auto& seen = landmark.observations.front();
+    const auto& truth =
+        world.points_map()[static_cast<std::size_t>(world.point_of(seen.keyframe, seen.feature))];
+    errors_m.push_back((landmark.landmark.p_map - truth).norm());
+  }
+  std::sort(errors_m.begin(), errors_m.end());
+  EXPECT_LT(errors_m[errors_m.size() / 2], 0.03);
+}
+
+TEST(MapperTest, FoundsLandmarksFromDepthAndTriangulatesTheOthers) {
+  MappingWorld world;
+  Mapper mapper({}, world.camera());
+  const auto first = mapper.insert(world.look(MappingWorld::on_street(0.0), mapper));
+  EXPECT_TRUE(first.inserted);
+  EXPECT_GT(first.from_depth, 200U);
+  EXPECT_EQ(first.triangulated, 0U);
+  const auto second = mapper.insert(world.look(MappingWorld::on_street(1.0), mapper));
+  EXPECT_GT(second.observed, 150U);
+  EXPECT_GT(second.triangulated, 30U);
+  mapper.map().check_consistency();
+}
+
+TEST(MapperTest, EveryObservationShowsTheSamePoint) {
+  MappingWorld world;
+  const Mapper mapper = drive(world, 12);
+  std::size_t wrong = 0;
+  std::size_t all = 0;
+  for (const auto id : mapper.map().landmark_ids()) {
+    const auto& seen = mapper.map().landmark(id).observations;
+    const int point = world.point_of(seen.front().keyframe, seen.front().feature);
+    for (const auto& other : seen) {
+      ++all;
+      if (world.point_of(other.keyframe, other.feature) != point) ++wrong;
+    }
+  }
+  EXPECT_GT(all, 1000U);
+  EXPECT_EQ(wrong, 0U);  // descriptors are random: 50 equal-looking bits of 256 do not happen
+}
+
+TEST(MapperTest, RepeatsItselfToTheBit) {
+  std::vector<double> numbers[2];
+  for (auto& list : numbers) {
+    MappingWorld world;
+    const Mapper mapper = drive(world, 8);
+    for (const auto& [id, keyframe] : mapper.map().keyframes()) {
+      const auto& t = keyframe.frame.T_map_camera.translation();
+      list.insert(list.end(), {t.x(), t.y(), t.z()});
+    }
+    for (const auto id : mapper.map().landmark_ids()) {
+      const auto& p = mapper.map().landmark(id).landmark.p_map;
+      list.insert(list.end(), {static_cast<double>(id), p.x(), p.y(), p.z()});
+    }
+  }
+  ASSERT_EQ(numbers[0].size(), numbers[1].size());
+  EXPECT_EQ(0,
+            std::memcmp(numbers[0].data(), numbers[1].data(), numbers[0].size() * sizeof(double)));
+}
+
+TEST(MapperTest, RefusesWhatDoesNotFit) {
+  MappingWorld world;
+  Mapper mapper({}, world.camera());
+  auto keyframe = world.look(MappingWorld::on_street(0.0), mapper);
+  auto broken = keyframe;
+  broken.landmark_ids.pop_back();
+  EXPECT_FALSE(mapper.insert(broken).inserted);
+  broken = keyframe;
+  broken.id = 0;
+  EXPECT_FALSE(mapper.insert(broken).inserted);
+  broken = keyframe;
+  broken.T_map_camera = SE3({}, Eigen::Vector3d::Constant(std::nan("")));
+  EXPECT_FALSE(mapper.insert(broken).inserted);
+  EXPECT_TRUE(mapper.map().keyframes().empty());
+  EXPECT_TRUE(mapper.insert(keyframe).inserted);
+  const auto again = mapper.insert(keyframe);
+  EXPECT_FALSE(again.inserted);
+  EXPECT_NE(again.problem.find("taken"), std::string::npos);
+}
+
+TEST(MapperTest, TakesAKeyframeWithoutFeatures) {
+  MappingWorld world;
+  Mapper mapper({}, world.camera());
+  tracking::Keyframe blind;
+  blind.id = 1;
+  EXPECT_TRUE(mapper.process(blind).inserted);
+  EXPECT_EQ(mapper.local_map(5, 1).keyframes.size(), 1U);
+}
+
+TEST(MapperTest, KeyframeFromBeforeACorrectionGoesWithItsParent) {
+  MappingWorld world({.pose_noise = 0.0});
+  Mapper mapper({}, world.camera());
+  mapper.insert(world.look(MappingWorld::on_street(0.0), mapper));
+  mapper.insert(world.look(MappingWorld::on_street(1.0), mapper));
+  const auto late = world.look(MappingWorld::on_street(2.0), mapper);
+  const SE3 T_new_old(geometry::SO3::exp({0.0, 0.1, 0.0}), {3.0, 0.0, 0.0});
+  LoopProposal proposal{mapper.epoch(), 2, 1, {}};
+  for (const auto& [id, keyframe] : mapper.map().keyframes()) {
+    proposal.poses[id] = T_new_old * keyframe.frame.T_map_camera;
+  }
+  ASSERT_EQ(mapper.correct(proposal), "");
+  mapper.insert(late);
+  const SE3 expected = T_new_old * late.T_map_camera;
+  EXPECT_LT(geometry::local(expected, mapper.map().keyframe(late.id).frame.T_map_camera).norm(),
+            1e-9);
+}
+
+TEST(MapperTest, ChangesNameWhatIsNewMovedAndGone) {
+  MappingWorld world;
+  Mapper mapper({}, world.camera());
+  EXPECT_TRUE(mapper.take_changes().empty());
+  mapper.insert(world.look(MappingWorld::on_street(0.0), mapper));
+  mapper.insert(world.look(MappingWorld::on_street(1.0), mapper));
+  const auto changes = mapper.take_changes();
+  ASSERT_EQ(changes.keyframes.size(), 2U);
+  ASSERT_EQ(changes.edges.size(), 1U);
+  EXPECT_EQ(changes.edges[0].a, 1U);
+  EXPECT_EQ(changes.edges[0].b, 2U);
+  EXPECT_GT(changes.edges[0].shared, 100);
+  EXPECT_TRUE(mapper.take_changes().empty());
+}
+
+// Standing around at one place: the root, the protected newest, and what makes a point seen by
+// three others is all that a place needs.
+TEST(MapperTest, RevisitsDoNotGrowTheMap) {
+  MappingWorld world({.length_m = 25.0});
+  Mapper mapper({}, world.camera());
+  std::size_t after_first_lap = 0;
+  for (int lap = 0; lap < 4; ++lap) {
+    for (int i = 0; i < 8; ++i) {
+      const double z_m = lap % 2 == 0 ? 0.5 * i : 3.5 - 0.5 * i;
+      mapper.process(world.look(MappingWorld::on_street(z_m), mapper));
+    }
+    if (lap == 0) after_first_lap = mapper.map().keyframes().size();
+  }
+  mapper.map().check_consistency();
+  EXPECT_LE(mapper.map().keyframes().size(), after_first_lap + 4);
+  EXPECT_NE(mapper.map().find_keyframe(1), nullptr);
+  EXPECT_FALSE(mapper.take_changes().removed.empty());
+}
+
+TEST(MapperTest, InterruptedOrOutdatedBundlesAreSafe) {
+  MappingWorld world;
+  Mapper mapper({}, world.camera());
+  for (int i = 0; i < 4; ++i) mapper.insert(world.look(MappingWorld::on_street(i), mapper));
+  auto job = mapper.local_job(4);
+  const std::atomic<bool> stop = true;
+  EXPECT_EQ(job.solve(&stop).status, optimization::BundleSummary::Status::kInterrupted);
+  EXPECT_TRUE(mapper.finish(job));
+  auto outdated = mapper.local_job(4);
+  (void)outdated.solve();
+  LoopProposal proposal{mapper.epoch(), 4, 1, {{4, mapper.map().keyframe(4).frame.T_map_camera}}};
+  ASSERT_EQ(mapper.correct(proposal), "");
+  EXPECT_FALSE(mapper.finish(outdated));
+  mapper.map().check_consistency();
+}
+
+TEST(MapperTest, BundleOfAnEarlierStateTakesLaterKeyframesAlong) {
+  MappingWorld world;
+  Mapper mapper({}, world.camera());
+  for (int i = 0; i < 4; ++i) mapper.insert(world.look(MappingWorld::on_street(i), mapper));
+  auto job = mapper.local_job(4);
+  mapper.insert(world.look(MappingWorld::on_street(4.0), mapper));
+  const auto parent = mapper.map().keyframe(5).parent;
+  const SE3 before = mapper.map().keyframe(parent).frame.T_map_camera.inverse() *
+                     mapper.map().keyframe(5).frame.T_map_camera;
+  (void)job.solve();
+  ASSERT_TRUE(mapper.finish(job));
+  const SE3 after = mapper.map().keyframe(parent).frame.T_map_camera.inverse() *
+                    mapper.map().keyframe(5).frame.T_map_camera;
+  EXPECT_LT(geometry::local(before, after).norm(), 1e-9);
+  mapper.map().check_consistency();
+}
+
+// The far end of the street was mapped with 2 m of drift; the loop says where it really is.
+TEST(MapperTest, CorrectionMovesTheMapAndFusesTheDouble) {
+  MappingWorld world({.pose_noise = 0.0});
+  Mapper mapper({}, world.camera());
+  for (int i = 0; i < 6; ++i) mapper.process(world.look(MappingWorld::on_street(i), mapper));
+  // The same places again, not recognised: tracking founds all landmarks anew, 2 m off.
+  const SE3 drift({}, {2.0, 0.0, 0.0});
+  KeyframeId last = 0;
+  for (int i = 0; i < 6; ++i) {
+    auto keyframe = world.look(MappingWorld::on_street(i), mapper, 7);
+    keyframe.T_map_camera = drift * keyframe.T_map_camera;
+    keyframe.parent_id = last;
+    if (last != 0) {
+      keyframe.T_parent_camera =
+          mapper.map().keyframe(last).frame.T_map_camera.inverse() * keyframe.T_map_camera;
+    }
+    ASSERT_TRUE(mapper.insert(keyframe).inserted);
+    last = keyframe.id;
+  }
+  const std::size_t double_count = mapper.map().landmark_count();
+  LoopProposal proposal{mapper.epoch(), last, 6, {}};
+  // Loop closing did not know the last keyframe's pose: it goes with its parent.
+  for (KeyframeId id = 7; id < last; ++id) {
+    proposal.poses[id] = drift.inverse() * mapper.map().keyframe(id).frame.T_map_camera;
+  }
+  const auto epoch = mapper.epoch();
+  ASSERT_EQ(mapper.correct(proposal), "");
+  EXPECT_EQ(mapper.epoch(), epoch + 1);
+  mapper.map().check_consistency();
+  EXPECT_LT(worst_position_m(mapper, world), 0.05);
+  std::set<int> points;
+  for (const auto id : mapper.map().landmark_ids()) {
+    const auto& seen = mapper.map().landmark(id).observations.front();
+    points.insert(world.point_of(seen.keyframe, seen.feature));
+  }
+  // Nearly one landmark per point again.
+  EXPECT_GT(static_cast<double>(double_count), 1.5 * static_cast<double>(points.size()));
+  EXPECT_LT(static_cast<double>(mapper.map().landmark_count()),
+            1.1 * static_cast<double>(points.size()));
+  EXPECT_GT(mapper.map().keyframe(last).shared.at(6), 100);
+
+  auto job = mapper.full_job();
+  const auto summary = job.solve();
+  EXPECT_LT(summary.cost_after, summary.cost_before);
+  EXPECT_TRUE(mapper.finish(job));
+  EXPECT_LT(worst_position_m(mapper, world), 0.02);
+}
+
+TEST(MapperTest, RefusesCorrectionsThatDoNotFit) {
+  MappingWorld world;
+  Mapper mapper({}, world.camera());
+  mapper.insert(world.look(MappingWorld::on_street(0.0), mapper));
+  EXPECT_NE(mapper.correct({mapper.epoch() + 1, 1, 1, {}}), "");
+  EXPECT_NE(mapper.correct({mapper.epoch(), 77, 1, {}}), "");
+  const SE3 nan({}, Eigen::Vector3d::Constant(std::nan("")));
+  EXPECT_NE(mapper.correct({mapper.epoch(), 1, 1, {{1, nan}}}), "");
+  EXPECT_EQ(mapper.epoch(), 0U);
+}
+
+TEST(MapperTest, LocalMapIsBoundedSortedAndKeepsALostReference) {
+  MappingWorld world;
+  MappingConfig config;
+  config.local_map_keyframes = 5;
+  config.local_map_landmarks = 200;
+  const Mapper mapper = drive(world, 10, 1.0, config);
+  const auto local = mapper.local_map(77, 10);
+  EXPECT_EQ(local.frame_id, 77U);
+  EXPECT_EQ(local.reference_keyframe_id, 10U);
+  EXPECT_EQ(local.next_keyframe_id, 11U);
+  EXPECT_LE(local.keyframes.size(), 5U);
+  EXPECT_EQ(local.landmarks.size(), 200U);
+  const auto by_id = [](const auto& a, const auto& b) { return a.id < b.id; };
+  EXPECT_TRUE(std::is_sorted(local.landmarks.begin(), local.landmarks.end(), by_id));
+  EXPECT_TRUE(std::is_sorted(local.keyframes.begin(), local.keyframes.end(), by_id));
+  EXPECT_TRUE(std::any_of(local.keyframes.begin(), local.keyframes.end(), [](const auto& keyframe) {
+    return keyframe.id == 10;
+  }));
+  const Mapper empty({}, world.camera());
+  EXPECT_TRUE(empty.local_map(1, 1).keyframes.empty());
+}
+
+TEST(MapperTest, MetricDepthBeatsTheVirtualStereo) {
+  int metric_better = 0;
+  for (unsigned seed = 1; seed <= 5; ++seed) {
+    double error_m[2];
+    for (const bool metric : {false, true}) {
+      MappingWorld world({.depth_share = 0.9, .pose_noise = 0.02}, seed);
+      MappingConfig config;
+      config.depth_model = metric ? "metric" : "virtual_stereo";
+      error_m[metric ? 1 : 0] = mean_position_m(drive(world, 10, 1.0, config), world);
+    }
+    if (error_m[1] < error_m[0]) ++metric_better;
+    std::printf("seed %u: metric %.4f m, virtual stereo %.4f m\n", seed, error_m[1], error_m[0]);
+  }
+  EXPECT_EQ(metric_better, 5);
+}
+
+}  // namespace
+}  // namespace camvox::mapping
