@@ -6,10 +6,12 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <fstream>
+#include <map>
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "camvox/mapping/mapper.hpp"
 #include "camvox/tracking/frame_builder.hpp"
 #include "camvox/tracking/tracker.hpp"
 #include "evaluation.hpp"
@@ -27,6 +29,8 @@ struct Options {
   std::size_t frames = 0;
   std::string out;
   tracking::TrackerConfig tracker;
+  mapping::MappingConfig mapping;
+  bool without_mapping = false;
   bool verbose = false;
 };
 
@@ -54,7 +58,8 @@ class Stopwatch {
 };
 
 struct Times {
-  std::vector<double> yardstick_ms, build_ms, track_ms, update_ms, total_ms, mapping_ms, other_ms;
+  std::vector<double> yardstick_ms, build_ms, track_ms, update_ms, total_ms, mapping_ms, extract_ms,
+      other_ms;
 };
 
 void print_row(const char* name, const std::vector<double>& times_ms, double yardstick_ms) {
@@ -80,6 +85,7 @@ void print(const Times& times) {
   print_row("take in the local map", times.update_ms, yardstick_ms);
   print_row("tracking, all", times.total_ms, yardstick_ms);
   print_row("mapping of a keyframe", times.mapping_ms, yardstick_ms);
+  print_row("cut out the local map", times.extract_ms, yardstick_ms);
 }
 
 void print(std::size_t number, const tracking::FrameResult& result) {
@@ -107,7 +113,8 @@ class Run {
         recording_(recording),
         builder_(builder_config(options), recording.intrinsics),
         tracker_(options.tracker, builder_.tracking_camera(), recording.T_body_camera),
-        mapping_(builder_.tracking_camera()),
+        founded_(builder_.tracking_camera()),
+        mapper_(options.mapping, builder_.tracking_camera()),
         depth_source_(recording),
         orb_(cv::ORB::create(options.features)) {}
 
@@ -120,13 +127,16 @@ class Run {
     config.extractor.features = options.features;
     return config;
   }
+  void insert(const tracking::Keyframe& keyframe, tracking::KeyframeId reference);
+  [[nodiscard]] std::map<tracking::KeyframeId, SE3> keyframe_poses() const;
   [[nodiscard]] std::vector<SE3> trajectory_body() const;
 
   const Options& options_;
   const Recording& recording_;
   tracking::FrameBuilder builder_;
   tracking::Tracker tracker_;
-  FoundedMap mapping_;
+  FoundedMap founded_;
+  mapping::Mapper mapper_;
   DepthSource depth_source_;
   cv::Ptr<cv::ORB> orb_;
   geometry::Vector6d twist_camera_ = geometry::Vector6d::Zero();
@@ -153,9 +163,11 @@ void Run::process(std::size_t number) {
   double total_ms = watch.lap(times_.build_ms);
   auto result = tracker_.track(std::move(frame));
   total_ms += watch.lap(times_.track_ms);
-  if (result.keyframe) mapping_.insert(*result.keyframe);
-  auto map = mapping_.local_map(number + 1);
+  if (result.keyframe) insert(*result.keyframe, result.reference_keyframe_id);
   watch.lap(result.keyframe ? times_.mapping_ms : times_.other_ms);
+  auto map = options_.without_mapping ? founded_.local_map(number + 1)
+                                      : mapper_.local_map(number + 1, result.reference_keyframe_id);
+  watch.lap(times_.extract_ms);
   tracker_.update_map(std::move(map));
   total_ms += watch.lap(times_.update_ms);
   times_.total_ms.push_back(total_ms);
@@ -166,15 +178,31 @@ void Run::process(std::size_t number) {
   results_.push_back(std::move(result));
 }
 
-/// With the keyframes where mapping has them in the end.
+void Run::insert(const tracking::Keyframe& keyframe, tracking::KeyframeId reference) {
+  if (options_.without_mapping) return founded_.insert(keyframe);
+  mapper_.set_reference(reference);
+  const auto report = mapper_.process(keyframe);
+  if (!report.inserted) throw std::runtime_error("keyframe refused: " + report.problem);
+}
+
+/// Where mapping has them in the end.
+std::map<tracking::KeyframeId, SE3> Run::keyframe_poses() const {
+  if (options_.without_mapping) return founded_.poses();
+  std::map<tracking::KeyframeId, SE3> poses;
+  for (const auto& keyframe : mapper_.all_changes().keyframes) {
+    poses[keyframe.id] = keyframe.T_map_camera;
+  }
+  return poses;
+}
+
 std::vector<SE3> Run::trajectory_body() const {
-  const auto poses = mapping_.poses();
+  const auto poses = keyframe_poses();
   std::vector<SE3> trajectory;
   for (const auto& result : results_) {
-    const SE3 T_map_keyframe =
-        result.has_pose() ? poses.at(result.reference_keyframe_id) : geometry::SE3();
-    trajectory.push_back(T_map_keyframe * result.T_keyframe_camera *
-                         recording_.T_body_camera.inverse());
+    const auto keyframe = poses.find(result.reference_keyframe_id);
+    const SE3 T_map_camera =
+        keyframe == poses.end() ? result.T_map_camera : keyframe->second * result.T_keyframe_camera;
+    trajectory.push_back(T_map_camera * recording_.T_body_camera.inverse());
   }
   return trajectory;
 }
@@ -211,7 +239,7 @@ void Run::report() const {
   std::printf("frames %zu, without pose %zu, keyframes %zu\n",
               results_.size(),
               lost,
-              mapping_.poses().size());
+              keyframe_poses().size());
   std::printf("ATE rmse %.4f m, max %.4f m; scale error %+.3f %%, rmse with scale %.4f m\n",
               error.rmse_m,
               error.max_m,
@@ -232,6 +260,7 @@ int main(int argc, char** argv) {
   app.add_option("--out", options.out, "trajectory of the body, TUM");
   app.add_option("--depth-model", options.tracker.depth_model, "metric or virtual_stereo");
   app.add_option("--sigma-px", options.tracker.sigma_px);
+  app.add_flag("--without-mapping", options.without_mapping, "landmarks stay as founded");
   app.add_flag("--verbose", options.verbose);
   CLI11_PARSE(app, argc, argv);
   cv::setNumThreads(1);
