@@ -46,9 +46,10 @@ void FeatureExtractor::describe_level(int level, FrameFeatures& features) const 
 }
 
 void FeatureExtractor::extract(const ImageView& image, FrameFeatures& features) {
-  if (image.width_px < 0 || image.height_px < 0 || image.step_bytes < image.width_px) {
-    throw std::logic_error("image view without a valid size");
-  }
+  constexpr int kMaxSide_px = 65535;  // corners have 16-bit places
+  const bool valid = image.width_px >= 0 && image.height_px >= 0 && image.width_px <= kMaxSide_px &&
+                     image.height_px <= kMaxSide_px && image.step_bytes >= image.width_px;
+  if (!valid) throw std::logic_error("image view without a valid size");
   features.key_points.clear();
   features.descriptors.clear();
   features.undistorted_px.clear();

@@ -111,6 +111,7 @@ TEST(FeatureExtractor, RefusesBrokenInput) {
   FeatureExtractor extractor(ExtractorConfig{});
   const TestImage image = noise_image(100, 100, 1);
   EXPECT_THROW((void)extractor.extract({image.pixels.data(), 100, 100, 99}), std::logic_error);
+  EXPECT_THROW((void)extractor.extract({image.pixels.data(), 70000, 1, 70000}), std::logic_error);
 }
 
 }  // namespace

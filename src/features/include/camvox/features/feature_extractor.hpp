@@ -44,7 +44,8 @@ class FeatureExtractor {
 
   /// Replaces key_points and descriptors of `features` by those of the image, coarse levels first,
   /// and empties its other lists. An image too small for a patch (39 px) has none. The image is
-  /// distorted or not: key points are where they are seen.
+  /// distorted or not: key points are where they are seen. Throws std::logic_error for a view whose
+  /// sides are negative, longer than 65535 px, or longer than its step.
   void extract(const ImageView& image, FrameFeatures& features);
   [[nodiscard]] FrameFeatures extract(const ImageView& image);
 
