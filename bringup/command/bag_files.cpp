@@ -9,6 +9,8 @@
 #include "camvox/storage/recover.hpp"
 #include "camvox/storage/sink.hpp"
 #include "camvox/storage/source.hpp"
+#include "progress_bar.hpp"
+#include "signals.hpp"
 
 /// Words that work on files alone: recover, doctor, convert.
 namespace camvox::command {
@@ -22,18 +24,35 @@ std::unique_ptr<storage::Source> open_source(const std::string& path) {
   return std::move(*source);
 }
 
+int interrupted() {
+  fmt::print(stderr, "camvox: interrupted; nothing is left behind\n");
+  return Exit::kInterrupted;
+}
+
 int recover_file(const std::string& input, const std::string& output) {
   const auto source = open_source(input);
   if (std::filesystem::exists(output)) throw CommandError(output + " exists already");
   auto sink = storage::FileSink::create(output);
   require_ok(sink.status());
-  const auto result = storage::recover(*source, std::move(*sink));
+  StopSignal stop;
+  bool stopped = false;
+  const auto result = [&] {
+    ProgressBar bar("recover " + input);
+    storage::RecoverOptions options;
+    options.progress = [&](std::uint64_t done) {
+      bar.update(done, source->size());
+      stopped = stop.wait(std::chrono::milliseconds(0));
+      return !stopped;
+    };
+    return storage::recover(*source, std::move(*sink), options);
+  }();
   for (const auto& problem : result.problems) {
     fmt::print(stderr, "at byte {}: {}\n", problem.offset, problem.status.message());
   }
   if (!result.status.ok()) {
     std::error_code ignored;
     std::filesystem::remove(output, ignored);
+    if (stopped) return interrupted();
     throw CommandError(result.status.message());
   }
   fmt::print("{}: {} messages, {} attachments, {} metadata records recovered{}\n",
@@ -75,6 +94,33 @@ struct ConvertOptions {
   std::uint64_t max_bag_size = 0;
 };
 
+/// Copies messages, with a progress bar, until the end or Ctrl-C (false). The numbers are the
+/// writer's, by topic of the bag.
+bool copy_messages(const storage::BagReader& bag,
+                   const ConvertOptions& options,
+                   const std::vector<std::size_t>& numbers,
+                   storage::BagWriter& writer) {
+  StopSignal stop;
+  ProgressBar bar("convert " + options.input);
+  storage::MessageFilter filter;
+  filter.topics = options.topics;
+  auto cursor = bag.messages(filter);
+  const auto length_ns = static_cast<std::uint64_t>(bag.end_time_ns() - bag.start_time_ns());
+  for (const auto* message = cursor.next(); message != nullptr; message = cursor.next()) {
+    require_ok(writer.write(numbers[message->topic],
+                            message->log_time_ns,
+                            message->publish_time_ns,
+                            message->data,
+                            message->sequence));
+    bar.update(static_cast<std::uint64_t>(message->log_time_ns - bag.start_time_ns()), length_ns);
+    if (stop.wait(std::chrono::milliseconds(0))) return false;
+  }
+  const auto read_status = cursor.status();
+  require_ok(writer.close());  // what could be read is kept
+  require_ok(read_status);
+  return true;
+}
+
 int convert(const ConvertOptions& options) {
   const auto bag = open_bag(options.input);
   storage::BagWriterOptions writer_options;
@@ -90,21 +136,13 @@ int convert(const ConvertOptions& options) {
     require_ok(number.status());
     numbers.push_back(*number);
   }
-  storage::MessageFilter filter;
-  filter.topics = options.topics;
-  auto cursor = bag->messages(filter);
-  std::uint64_t count = 0;
-  for (const auto* message = cursor.next(); message != nullptr; message = cursor.next(), ++count) {
-    require_ok((*writer)->write(numbers[message->topic],
-                                message->log_time_ns,
-                                message->publish_time_ns,
-                                message->data,
-                                message->sequence));
+  if (!copy_messages(*bag, options, numbers, **writer)) {
+    writer->reset();
+    std::error_code ignored;
+    std::filesystem::remove_all(options.output, ignored);  // it was made here
+    return interrupted();
   }
-  const auto read_status = cursor.status();
-  require_ok((*writer)->close());  // what could be read is kept
-  require_ok(read_status);
-  fmt::print("{}: {} messages\n", options.output, count);
+  fmt::print("{}: {} messages\n", options.output, (*writer)->metadata().message_count);
   return Exit::kDone;
 }
 

@@ -28,6 +28,7 @@ class Recovery {
       RawRecord raw;
       if (reader_.next(raw)) {
         add(raw);
+        report_progress();
       } else if (!skip_damage()) {
         break;
       }
@@ -38,6 +39,11 @@ class Recovery {
   }
 
  private:
+  void report_progress() {
+    if (!options_.progress || options_.progress(reader_.offset()) || !result_.status.ok()) return;
+    result_.status = {StatusCode::kInvalid, "interrupted"};
+  }
+
   void open(std::unique_ptr<Sink> out) {
     McapWriterOptions writer = options_.writer;
     writer.profile.clear();

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -15,6 +16,8 @@ struct RecoverOptions {
   McapWriterOptions writer;
   /// Of the new file's chunks. Nothing: as in the old one.
   std::optional<Compression> compression;
+  /// Called after each record with the bytes done; recovery ends when it returns false.
+  std::function<bool(std::uint64_t bytes_done)> progress;
 };
 
 /// What `recover` found.
