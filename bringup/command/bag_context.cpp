@@ -9,7 +9,8 @@ constexpr std::chrono::milliseconds kEndTimeout{1000};
 
 SingleComponent::SingleComponent(const Session& session,
                                  const std::string& name,
-                                 config::ParameterMap parameters)
+                                 config::ParameterMap parameters,
+                                 LogLevel log_level)
     : executor_(std::make_shared<dds::Executor>(name)) {
   dds::Middleware middleware;
   middleware.participant = session.participant();
@@ -17,7 +18,7 @@ SingleComponent::SingleComponent(const Session& session,
       dds::ComponentSettings{name, std::move(parameters), {}},
       middleware,
       executor_,
-      std::make_shared<bringup::ConsoleLogger>(name, LogLevel::kInfo),
+      std::make_shared<bringup::ConsoleLogger>(name, log_level),
       [this](std::exception_ptr error) {
         error_ = std::move(error);
         stop_.request();

@@ -14,7 +14,10 @@ namespace camvox::command {
 /// a keyboard. An exception that leaves a callback ends the wait and is thrown by `finish`.
 class SingleComponent {
  public:
-  SingleComponent(const Session& session, const std::string& name, config::ParameterMap parameters);
+  SingleComponent(const Session& session,
+                  const std::string& name,
+                  config::ParameterMap parameters,
+                  LogLevel log_level = LogLevel::kInfo);
   SingleComponent(const SingleComponent&) = delete;
   SingleComponent& operator=(const SingleComponent&) = delete;
   ~SingleComponent();

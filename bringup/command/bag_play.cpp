@@ -6,6 +6,7 @@
 
 #include "bag.hpp"
 #include "bag_context.hpp"
+#include "camvox/bringup/parameter_file.hpp"
 #include "camvox/recording/replay_component.hpp"
 #include "keyboard.hpp"
 
@@ -29,6 +30,12 @@ struct PlayOptions {
   bool start_paused = false;
   bool no_keyboard = false;
   std::int64_t read_ahead_mb = 256;
+  std::int64_t read_ahead_queue_size = 0;
+  std::string qos_overrides;
+  std::string storage_config;
+  std::optional<std::int64_t> ack_timeout_ms;
+  bool no_loans = false;
+  std::string log_level = "info";
 };
 
 config::ParameterMap to_parameters(const PlayOptions& options) {
@@ -44,8 +51,10 @@ config::ParameterMap to_parameters(const PlayOptions& options) {
   set("clock_hz", options.clock_hz);
   set("start_offset_s", options.start_offset_s);
   // The publishers exist during the delay, so that subscribers find them before it starts.
-  set("start_paused", options.start_paused || options.delay_s > 0.0);
+  set("paused", options.start_paused || options.delay_s > 0.0);
   set("read_ahead_mb", options.read_ahead_mb);
+  set("read_ahead_messages", options.read_ahead_queue_size);
+  set("qos_overrides", options.qos_overrides);
   return parameters;
 }
 
@@ -94,10 +103,45 @@ void play_to_end(SingleComponent& component, ReplayComponent& replay, bool keybo
   }
 }
 
+/// The file must be one, but nothing in it matters: reading MCAP has no options.
+void check_storage_config(const std::string& path) {
+  if (path.empty()) return;
+  std::vector<config::Problem> problems;
+  const auto parameters = bringup::read_parameter_file(path, problems);
+  if (!problems.empty()) throw config::ConfigError(std::move(problems));
+  for (const auto& entry : parameters) {
+    fmt::print(stderr,
+               "camvox: warning: {}: {} has no effect on reading MCAP\n",
+               entry.second.location.to_string(),
+               entry.first);
+  }
+}
+
+/// Waits as --wait-for-all-acked says, or until Ctrl-C; 0 ms is for ever.
+void wait_for_all_acked(SingleComponent& component,
+                        const ReplayComponent& replay,
+                        std::chrono::milliseconds timeout) {
+  for (const auto& topic : replay.best_effort_topics()) {
+    fmt::print(stderr, "camvox: warning: {} is best effort: nobody acknowledges it\n", topic);
+  }
+  const auto end = std::chrono::steady_clock::now() + timeout;
+  while (!replay.wait_for_acknowledgments(kRefresh)) {
+    if (component.stop_signal().wait(0ms)) return;
+    if (timeout > 0ms && std::chrono::steady_clock::now() >= end) {
+      fmt::print(stderr, "camvox: warning: not all messages were acknowledged in time\n");
+      return;
+    }
+  }
+}
+
 int play(const PlayOptions& options, const CommonOptions& common) {
+  check_storage_config(options.storage_config);
   (void)open_bag(options.path);  // an error or a warning before anything else happens
   const Session session(common);
-  SingleComponent component(session, "rosbag2_player", to_parameters(options));
+  SingleComponent component(session,
+                            "rosbag2_player",
+                            to_parameters(options),
+                            bringup::parse_log_level(options.log_level));
   ReplayComponent replay(component.context());
   replay.start();
   component.activate([] {});
@@ -107,12 +151,42 @@ int play(const PlayOptions& options, const CommonOptions& common) {
     replay.player().set_paused(options.start_paused);
   }
   play_to_end(component, replay, !options.no_keyboard);
+  if (options.ack_timeout_ms && replay.player().state().finished) {
+    wait_for_all_acked(component, replay, std::chrono::milliseconds(*options.ack_timeout_ms));
+  }
   replay.player().stop();
   component.finish();
   const auto state = replay.player().state();
   require_ok(state.status);
   fmt::print("{} messages sent\n", state.sent);
   return Exit::kDone;
+}
+
+void add_tuning(CLI::App& command, PlayOptions& options) {
+  command
+      .add_option("--read-ahead-queue-size",
+                  options.read_ahead_queue_size,
+                  "Bound of what is read ahead, messages (default: none)")
+      ->check(CLI::PositiveNumber);
+  command
+      .add_option("--qos-profile-overrides-path",
+                  options.qos_overrides,
+                  "YAML file of QoS by topic; wins over what was recorded")
+      ->check(CLI::ExistingFile);
+  command
+      .add_option("--storage-config-file",
+                  options.storage_config,
+                  "YAML file for the storage; reading MCAP has no options")
+      ->check(CLI::ExistingFile);
+  command
+      .add_option("--wait-for-all-acked",
+                  options.ack_timeout_ms,
+                  "At the end, wait this long for reliable readers, ms (0: for ever)")
+      ->check(CLI::NonNegativeNumber);
+  command.add_flag("--disable-loan-message", options.no_loans, "Has no effect: bytes need no loan");
+  command
+      .add_option("--log-level", options.log_level, "debug, info (default), warn, error or fatal")
+      ->check(CLI::IsMember({"debug", "info", "warn", "error", "fatal"}));
 }
 
 }  // namespace
@@ -140,6 +214,7 @@ void add_bag_play(CLI::App& bag, const CommonOptions& common, Action& action) {
   command->add_flag("--disable-keyboard-controls", options->no_keyboard, "No keys");
   command->add_option("--read-ahead-mb", options->read_ahead_mb, "Bound of what is read ahead, MiB")
       ->check(CLI::Range(1, 65536));
+  add_tuning(*command, *options);
   command->callback([options, &common, &action] {
     action = [options, &common] { return play(*options, common); };
   });

@@ -50,6 +50,14 @@ void RosPublisher::discard(void* message) noexcept {
   --loans_;
 }
 
+bool RosPublisher::wait_for_acknowledgments(std::chrono::nanoseconds timeout) {
+  constexpr std::int64_t kSecond_ns = 1'000'000'000;
+  const eprosima::fastrtps::Duration_t duration(
+      static_cast<std::int32_t>(timeout.count() / kSecond_ns),
+      static_cast<std::uint32_t>(timeout.count() % kSecond_ns));
+  return writer_->wait_for_acknowledgments(duration) == ReturnCode::RETCODE_OK;
+}
+
 RosSubscription::Source::Source(const std::shared_ptr<Participant>& participant,
                                 const std::string& topic,
                                 MessageType message_type,

@@ -21,6 +21,7 @@ class RosPublisher final : public PublisherBackend {
   void publish(void* message) override;
   void discard(void* message) noexcept override;
   [[nodiscard]] std::size_t subscriber_count() const override { return writer_.reader_count(); }
+  [[nodiscard]] bool wait_for_acknowledgments(std::chrono::nanoseconds timeout) override;
 
  private:
   MessageType type_;

@@ -120,7 +120,10 @@ void Player::push(PlayedMessage message) {
   std::unique_lock lock(mutex_);
   const std::size_t bytes = message.cdr.size();
   changed_.wait(lock, [&] {
-    return stopping_ || queue_.empty() || queued_bytes_ + bytes <= options_.read_ahead_bytes;
+    if (stopping_ || queue_.empty()) return true;
+    const auto most = options_.read_ahead_messages;
+    return queued_bytes_ + bytes <= options_.read_ahead_bytes &&
+           (most == 0 || queue_.size() < most);
   });
   queued_bytes_ += bytes;
   queue_.push_back(std::move(message));

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <chrono>
 #include <cstring>
+#include <fstream>
 #include <map>
+#include <sstream>
 #include <stdexcept>
 
 #include "camvox/storage/qos_profile.hpp"
@@ -42,6 +44,40 @@ Qos recorded_qos(const std::string& yaml) {
   return result;
 }
 
+/// The policies of an override that we know; a history of all becomes a long one.
+Qos to_qos(const storage::QosProfile& profile) {
+  using Profile = storage::QosProfile;
+  Qos result = qos::kDefault;
+  result.reliable = profile.reliability != Profile::Reliability::kBestEffort;
+  result.latched = profile.durability == Profile::Durability::kTransientLocal;
+  result.depth =
+      profile.history == Profile::History::kKeepAll
+          ? kQueuedMessages
+          : static_cast<int>(std::clamp<std::uint64_t>(profile.depth, 1, kQueuedMessages));
+  return result;
+}
+
+std::map<std::string, storage::QosProfile> read_overrides(const std::string& path) {
+  if (path.empty()) return {};
+  std::ifstream stream(path);
+  std::ostringstream text;
+  if (!stream || !(text << stream.rdbuf())) throw std::runtime_error(path + ": cannot be read");
+  auto overrides = storage::parse_qos_overrides(text.str(), path);
+  if (!overrides.ok()) throw std::runtime_error(overrides.status().message());
+  return *std::move(overrides);
+}
+
+/// `wanted`, or all topics, without /clock if we publish that ourselves.
+std::vector<std::string> played_topics(const storage::BagReader& bag, const ReplayConfig& config) {
+  auto names = config.topics;
+  if (config.clock_hz <= 0.0) return names;
+  if (names.empty()) {
+    for (const auto& topic : bag.topics()) names.push_back(topic.name);
+  }
+  std::erase(names, topics::kClock);
+  return names;
+}
+
 /// Capture stamp of a message that starts with std_msgs/Header: sec and nanosec behind the
 /// encapsulation, little-endian as everything that is recorded here.
 std::int64_t header_stamp_ns(const std::vector<std::uint8_t>& cdr) {
@@ -64,6 +100,8 @@ ReplayComponent::ReplayComponent(Context& context)
     clock_ = context.advertise<rosgraph_msgs::msg::Clock>({"clock", topics::kClock},
                                                           {.qos = qos::kClock});
   }
+  context.on_parameter_change<ReplayConfig>(
+      config_, [this](const ReplayConfig& next) { change(next); }, {"rate", "paused"});
   if (!config_.lockstep && !config_.exit_at_end) return;
   context.subscribe<camvox_interfaces::msg::Progress>(
       {"progress", topics::kProgress},
@@ -79,6 +117,22 @@ ReplayComponent::ReplayComponent(Context& context)
 
 ReplayComponent::~ReplayComponent() = default;
 
+void ReplayComponent::change(const ReplayConfig& config) {
+  config_ = config;
+  if (!player_) return;
+  player_->set_rate(config.rate);
+  player_->set_paused(config.paused);
+}
+
+bool ReplayComponent::wait_for_acknowledgments(std::chrono::nanoseconds timeout) const {
+  using Clock = std::chrono::steady_clock;
+  const auto deadline = Clock::now() + timeout;
+  return std::all_of(publishers_.begin(), publishers_.end(), [&](const auto& publisher) {
+    return publisher.wait_for_acknowledgments(
+        std::max(deadline - Clock::now(), Clock::duration(0)));
+  });
+}
+
 void ReplayComponent::start() {
   auto bag = storage::BagReader::open(config_.bag);
   if (!bag.ok()) throw std::runtime_error(bag.status().message());
@@ -90,9 +144,10 @@ void ReplayComponent::start() {
   options.as_fast_as_possible = config_.lockstep;
   options.loop = config_.loop;
   options.start_offset_s = config_.start_offset_s;
-  options.start_paused = config_.start_paused;
-  options.topics = config_.topics;
+  options.start_paused = config_.paused;
+  options.topics = played_topics(**bag, config_);
   options.read_ahead_bytes = static_cast<std::size_t>(config_.read_ahead_mb) << 20;
+  options.read_ahead_messages = static_cast<std::size_t>(config_.read_ahead_messages);
   player_ = std::make_unique<recording::Player>(
       std::move(*bag),
       options,
@@ -115,12 +170,19 @@ void ReplayComponent::start() {
 }
 
 void ReplayComponent::advertise_topics(const storage::BagReader& bag) {
+  const auto overrides = read_overrides(config_.qos_overrides);
   for (const auto& topic : bag.topics()) {
     const std::string name = remapped(topic.name, config_.remap);
-    PublishOptions options{.qos = recorded_qos(topic.offered_qos_profiles), .max_loans = 2};
+    const auto override = overrides.find(topic.name);
+    PublishOptions options{.qos = override == overrides.end()
+                                      ? recorded_qos(topic.offered_qos_profiles)
+                                      : to_qos(override->second),
+                           .max_loans = 2};
+    if (!options.qos.reliable) best_effort_topics_.push_back(topic.name);
     // Messages leave on another thread, and 200 IMU samples may be handed over at once: a writer's
     // history of 5 or 10 would lose most of them. Of a latched topic the depth means something.
-    if (!options.qos.latched) options.qos.depth = std::max(options.qos.depth, kQueuedMessages);
+    if (override == overrides.end() && !options.qos.latched)
+      options.qos.depth = std::max(options.qos.depth, kQueuedMessages);
     publishers_.push_back(context_.advertise_raw({topic.name, name}, topic.type, options));
     const bool frames = topic.name == config_.lockstep_topic ||
                         topic.name == config_.lockstep_topic + "/compressed";

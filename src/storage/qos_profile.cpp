@@ -112,4 +112,36 @@ Result<std::vector<QosProfile>> parse_qos_profiles(const std::string& yaml) {
   return profiles;
 }
 
+Result<std::map<std::string, QosProfile>> parse_qos_overrides(const std::string& yaml,
+                                                              const std::string& origin) {
+  static const Words kKeys = {"history",
+                              "depth",
+                              "reliability",
+                              "durability",
+                              "deadline",
+                              "lifespan",
+                              "liveliness",
+                              "liveliness_lease_duration",
+                              "avoid_ros_namespace_conventions"};
+  std::map<std::string, QosProfile> overrides;
+  try {
+    const YAML::Node root = YAML::Load(yaml);
+    if (!root.IsMap()) throw YAML::Exception(root.Mark(), "expected topics with their policies");
+    for (const auto& topic : root) {
+      if (!topic.second.IsMap()) throw YAML::Exception(topic.second.Mark(), "expected policies");
+      for (const auto& policy : topic.second) {
+        const auto key = policy.first.as<std::string>();
+        if (std::find(kKeys.begin(), kKeys.end(), key) == kKeys.end()) {
+          throw YAML::Exception(policy.first.Mark(), "no such QoS policy: " + key);
+        }
+      }
+      overrides[topic.first.as<std::string>()] = read_profile(topic.second);
+    }
+  } catch (const YAML::Exception& error) {
+    const auto line = error.mark.is_null() ? std::string() : std::to_string(error.mark.line + 1);
+    return Status(StatusCode::kInvalid, origin + ":" + line + ": " + error.msg);
+  }
+  return overrides;
+}
+
 }  // namespace camvox::storage

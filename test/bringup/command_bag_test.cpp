@@ -1,6 +1,7 @@
 #include <chrono>
 #include <regex>
 
+#include "camvox/storage/bag_writer.hpp"
 #include "command_fixture.hpp"
 
 namespace camvox::bringup {
@@ -93,6 +94,68 @@ TEST_F(CommandBag, RecoverSavesWhatIsWholeAndSaysThatSomethingWasLost) {
   EXPECT_THAT(recovered.output, HasSubstr("something was lost"));
   EXPECT_GT(message_count(path("saved.mcap")), 0U);
   EXPECT_EQ(command({"bag", "recover", path("saved.mcap"), "-o", path("again.mcap")}).exit_code, 0);
+}
+
+TEST_F(CommandBag, PlayTakesTheOptionsOfRos2Bag) {
+  record(path("drive"));
+  const auto qos = write("qos.yaml",
+                         "/camvox/frame_image: {history: keep_last, depth: 5, reliability: "
+                         "best_effort, durability: volatile}\n");
+  const auto storage = write("storage.yaml", "noChunkCRC: false\n");
+  const auto played = command({"bag",
+                               "play",
+                               path("drive"),
+                               "--rate",
+                               "4",
+                               "--qos-profile-overrides-path",
+                               qos,
+                               "--storage-config-file",
+                               storage,
+                               "--read-ahead-queue-size",
+                               "3",
+                               "--wait-for-all-acked",
+                               "500",
+                               "--disable-loan-message",
+                               "--log-level",
+                               "error"});
+  EXPECT_EQ(played.exit_code, 0) << played.output;
+  EXPECT_THAT(played.output, HasSubstr(" messages sent"));
+  EXPECT_THAT(played.output, HasSubstr("/camvox/frame_image is best effort"));
+  EXPECT_THAT(played.output, HasSubstr("noChunkCRC has no effect"));
+  EXPECT_THAT(played.output, ::testing::Not(HasSubstr("end of ")));  // that is level info
+
+  const auto bad = write("bad.yaml", "/a: {relability: reliable}\n");
+  const auto refused = command({"bag", "play", path("drive"), "--qos-profile-overrides-path", bad});
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_THAT(refused.output, HasSubstr("bad.yaml:1: no such QoS policy: relability"));
+  EXPECT_EQ(command({"bag", "play", path("drive"), "--log-level", "loud"}).exit_code, 2);
+  EXPECT_EQ(command({"bag", "play", path("drive"), "--wait-for-all-acked", "-1"}).exit_code, 2);
+  EXPECT_EQ(command({"bag", "play", path("drive"), "--read-ahead-queue-size", "0"}).exit_code, 2);
+}
+
+TEST_F(CommandBag, CtrlCEndsAConversionWithoutATrace) {
+  // 400 MB of messages: long enough to be interrupted, at any speed that a disk has.
+  {
+    auto writer = storage::BagWriter::create(path("big"));
+    ASSERT_TRUE(writer.ok());
+    storage::BagTopic topic;
+    topic.name = "/a";
+    topic.type = "test_msgs/msg/Bytes";
+    topic.schema = "uint8[] data\n";
+    const auto number = (*writer)->add_topic(topic);
+    const std::vector<std::byte> data(4'000'000);
+    for (std::int64_t i = 1; i <= 100; ++i) {
+      ASSERT_TRUE((*writer)->write(*number, i, i, data).ok());
+    }
+    ASSERT_TRUE((*writer)->close().ok());
+  }
+  const auto process = begin(
+      {"bag", "convert", "-i", path("big"), "-o", path("new"), "--compression-format", "zstd"});
+  ASSERT_TRUE(test::wait_until([&] { return fs::exists(path("new")); }));
+  kill(process->pid(), SIGINT);
+  EXPECT_EQ(process->wait(), 130) << process->output();
+  EXPECT_THAT(process->output(), HasSubstr("interrupted"));
+  EXPECT_FALSE(fs::exists(path("new")));
 }
 
 TEST_F(CommandBag, SaysWhatIsWrong) {

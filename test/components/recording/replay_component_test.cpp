@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include <chrono>
+#include <fstream>
 #include <thread>
 
 #include "bag_files.hpp"
@@ -33,6 +34,12 @@ bool logged(const FakeContext& fake, const std::string& text) {
     if (entry.text.find(text) != std::string::npos) return true;
   }
   return false;
+}
+
+std::vector<config::Problem> change(FakeContext& fake,
+                                    const std::string& key,
+                                    config::Value value) {
+  return fake.change_parameters({{key, {std::move(value), {}}}});
 }
 
 bool sent(FakeContext& fake, const std::string& count) {
@@ -106,6 +113,49 @@ TEST(ReplayComponent, PublishesTheClockOfTheRecording) {
   const auto clocks = fake.published<rosgraph_msgs::msg::Clock>("clock");
   ASSERT_EQ(clocks.size(), 1U);
   EXPECT_GE(clocks[0]->clock().sec(), kStart_ns / recording::kSecond_ns);
+}
+
+TEST(ReplayComponent, PauseAndRateMayChangeWhileItPlays) {
+  const TemporaryFolder folder;
+  recording::write_bag(folder.file("bag"), {{"/a", 0.0, 7}, {"/a", 1000.0, 8}});
+  FakeContext fake;
+  fake.set_parameter("bag", folder.file("bag"));
+  fake.set_parameter("paused", true);
+  ReplayComponent replay(fake);
+  EXPECT_TRUE(change(fake, "rate", 2.0).empty());  // before the start, too
+  replay.start();
+  EXPECT_TRUE(replay.player().state().paused);
+  EXPECT_TRUE(change(fake, "paused", false).empty());
+  ASSERT_TRUE(sent(fake, "1"));
+  EXPECT_TRUE(change(fake, "rate", 1e6).empty());
+  ASSERT_TRUE(run_until(fake, [&] { return logged(fake, "2 messages sent"); }));
+  const auto problems = change(fake, "loop", true);
+  ASSERT_EQ(problems.size(), 1U);
+  EXPECT_THAT(problems[0].message, ::testing::HasSubstr("fixed after start"));
+  EXPECT_FALSE(change(fake, "rate", -1.0).empty());
+}
+
+TEST(ReplayComponent, LeavesOutARecordedClockWhenItMakesItsOwn) {
+  const TemporaryFolder folder;
+  recording::write_bag(folder.file("bag"), {{"/clock", 0.0, 7}, {"/a", 0.0, 8}});
+  FakeContext fake;
+  fake.set_parameter("bag", folder.file("bag"));
+  fake.set_parameter("clock_hz", 10.0);
+  ReplayComponent replay(fake);
+  replay.start();
+  ASSERT_TRUE(run_until(fake, [&] { return logged(fake, "1 messages sent"); }));
+}
+
+TEST(ReplayComponent, OverridesOfQosWin) {
+  const TemporaryFolder folder;
+  recording::write_bag(folder.file("bag"), {{"/a", 0.0, 7}, {"/b", 0.0, 8}});
+  std::ofstream(folder.file("qos.yaml")) << "/b: {reliability: best_effort}\n";
+  FakeContext fake;
+  fake.set_parameter("bag", folder.file("bag"));
+  fake.set_parameter("qos_overrides", folder.file("qos.yaml"));
+  ReplayComponent replay(fake);
+  replay.start();
+  EXPECT_THAT(replay.best_effort_topics(), ::testing::ElementsAre("/b"));
 }
 
 TEST(ReplayComponent, MissingBagIsAClearError) {

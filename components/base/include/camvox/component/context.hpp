@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <cstdint>
 #include <functional>
@@ -108,12 +109,20 @@ class Context {
   }
 
   /// Lets parameters be set while running: `callback` gets each new, checked config on the
-  /// component's thread. Without this call every parameter is fixed after start.
+  /// component's thread. Without this call every parameter is fixed after start; with a list of
+  /// `changeable` keys, all others are.
   template <typename Config>
-  void on_parameter_change(Config current, std::function<void(const Config&)> callback) {
-    accept_changes([current, callback](const config::ParameterMap& changes) mutable {
+  void on_parameter_change(Config current,
+                           std::function<void(const Config&)> callback,
+                           const std::vector<std::string>& changeable = {}) {
+    accept_changes([current, callback, changeable](const config::ParameterMap& changes) mutable {
       Config next = current;
       auto problems = config::load(changes, next);
+      for (const auto& [key, parameter] : changes) {
+        if (changeable.empty() || !problems.empty()) break;
+        if (std::find(changeable.begin(), changeable.end(), key) != changeable.end()) continue;
+        problems.push_back({parameter.location, key, "is fixed after start"});
+      }
       if (problems.empty()) {
         current = next;
         callback(current);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <memory>
 #include <stdexcept>
@@ -31,6 +32,8 @@ class PublisherBackend {
   /// Gives a loaned message back unsent.
   virtual void discard(void* message) noexcept = 0;
   [[nodiscard]] virtual std::size_t subscriber_count() const = 0;
+  /// Waits until all reliable readers have everything that was published; false at the timeout.
+  [[nodiscard]] virtual bool wait_for_acknowledgments(std::chrono::nanoseconds) { return true; }
 };
 
 /// A message on loan: filled in place, then published; dropped if it is not.
@@ -85,6 +88,10 @@ class Publisher {
     publish(std::move(copy));
   }
   [[nodiscard]] std::size_t subscriber_count() const { return backend_->subscriber_count(); }
+  /// Waits until all reliable readers have everything that was published; false at the timeout.
+  [[nodiscard]] bool wait_for_acknowledgments(std::chrono::nanoseconds timeout) const {
+    return backend_->wait_for_acknowledgments(timeout);
+  }
 
  private:
   std::shared_ptr<PublisherBackend> backend_;

@@ -25,6 +25,7 @@ struct PlayerOptions {
   bool start_paused = false;
   std::vector<std::string> topics;                        ///< Empty: all.
   std::size_t read_ahead_bytes = std::size_t{256} << 20;  ///< Bound of what waits in memory.
+  std::size_t read_ahead_messages = 0;                    ///< The same, in messages; 0: no bound.
 };
 
 /// One message of the bag, ready to be sent.

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <chrono>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -14,15 +16,17 @@ namespace camvox {
 
 /// Parameters of ReplayComponent.
 struct ReplayConfig {
-  std::string bag;                  ///< A bag's folder, or one MCAP file.
-  double rate = 1.0;                ///< Speed; 1 is that of the recording.
-  bool loop = false;                ///< Starts again at the end.
-  double start_offset_s = 0.0;      ///< Leaves out the first part.
-  bool start_paused = false;        ///< Waits until somebody resumes it.
+  std::string bag;              ///< A bag's folder, or one MCAP file.
+  double rate = 1.0;            ///< Speed; 1 is that of the recording. May change while playing.
+  bool loop = false;            ///< Starts again at the end.
+  double start_offset_s = 0.0;  ///< Leaves out the first part.
+  bool paused = false;          ///< Sends nothing. May change while playing.
   std::vector<std::string> topics;  ///< Only these; empty: all.
   std::vector<std::string> remap;   ///< "from:=to" each, as `ros2 bag play --remap`.
   double clock_hz = 0.0;            ///< Publishes /clock this often; 0: never.
   int read_ahead_mb = 256;          ///< Bound of what is read ahead.
+  int read_ahead_messages = 0;      ///< The same in messages; 0: no bound.
+  std::string qos_overrides;        ///< YAML file of QoS by topic, as `ros2 bag play` takes it.
   bool lockstep = false;            ///< As fast as all listed components keep up, nothing dropped.
   std::string lockstep_topic = "/camera/image_raw";  ///< Or compressed: the frames.
   std::vector<std::string> lockstep_components;      ///< Who reports each frame done.
@@ -36,11 +40,13 @@ struct ReplayConfig {
     field("rate", self.rate, config::greater_than(0.0));
     field("loop", self.loop);
     field("start_offset_s", self.start_offset_s, config::at_least(0.0));
-    field("start_paused", self.start_paused);
+    field("paused", self.paused);
     field("topics", self.topics);
     field("remap", self.remap);
     field("clock_hz", self.clock_hz, config::at_least(0.0), config::at_most(1000.0));
     field("read_ahead_mb", self.read_ahead_mb, config::at_least(1));
+    field("read_ahead_messages", self.read_ahead_messages, config::at_least(0));
+    field("qos_overrides", self.qos_overrides);
     field("lockstep", self.lockstep);
     field("lockstep_topic", self.lockstep_topic);
     field("lockstep_components", self.lockstep_components);
@@ -60,8 +66,15 @@ class ReplayComponent final : public Component {
   void start() override;
   /// Pause, rate and progress; only after `start`.
   [[nodiscard]] recording::Player& player() { return *player_; }
+  /// Waits until all reliable readers have all messages; false at the timeout.
+  [[nodiscard]] bool wait_for_acknowledgments(std::chrono::nanoseconds timeout) const;
+  /// Topics whose readers acknowledge nothing.
+  [[nodiscard]] const std::vector<std::string>& best_effort_topics() const {
+    return best_effort_topics_;
+  }
 
  private:
+  void change(const ReplayConfig& config);
   void advertise_topics(const storage::BagReader& bag);
   void send(recording::PlayedMessage&& message);
   void report();
@@ -73,6 +86,7 @@ class ReplayComponent final : public Component {
   Publisher<rosgraph_msgs::msg::Clock> clock_;
   std::vector<Publisher<RawMessage>> publishers_;  // by number of the bag's topic
   std::vector<bool> is_frame_;                     // same
+  std::vector<std::string> best_effort_topics_;
   std::unique_ptr<recording::Player> player_;
   bool end_reported_ = false;
   std::int64_t last_activity_ns_ = 0;  // when the end was reached, or a frame reported done

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -49,5 +50,10 @@ struct QosProfile {
 /// Reads such a list, enums as numbers or words; missing keys keep their default. Empty text is an
 /// empty list.
 Result<std::vector<QosProfile>> parse_qos_profiles(const std::string& yaml);
+
+/// Reads a file of QoS overrides as `ros2 bag` takes it: a map from topics to profiles. `origin`
+/// is the file's name for messages.
+Result<std::map<std::string, QosProfile>> parse_qos_overrides(const std::string& yaml,
+                                                              const std::string& origin);
 
 }  // namespace camvox::storage
