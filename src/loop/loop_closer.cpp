@@ -1,0 +1,311 @@
+#include "camvox/loop/loop_closer.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <numbers>
+#include <set>
+
+#include "pose_graph_builder.hpp"
+
+namespace camvox::loop {
+namespace {
+
+using geometry::SE3;
+using geometry::Vector6d;
+
+bool same_loop(const LoopMeasurement& a, const LoopMeasurement& b) {
+  return a.query_id == b.query_id && a.match_id == b.match_id;
+}
+
+std::size_t size_of(int count) { return static_cast<std::size_t>(count); }
+
+}  // namespace
+
+LoopCloser::LoopCloser(const LoopCloserConfig& config) : config_(config), index_(config.index) {
+  config::require_valid(config);
+  keyframes_since_correction_ = config.correction_interval;
+}
+
+void LoopCloser::insert(const tracking::Keyframe& keyframe) {
+  if (map_.find(keyframe.id) != nullptr) index_.remove(keyframe.id);
+  map_.insert(keyframe);
+  index_.insert(keyframe.id, keyframe.features);
+  recent_.push_back(keyframe.id);
+  if (recent_.size() > size_of(config_.window_keyframes)) recent_.pop_front();
+  ++keyframes_since_correction_;
+}
+
+void LoopCloser::update(const MapChange& change) {
+  map_.apply(change);
+  for (const auto id : change.removed) {
+    index_.remove(id);
+    const auto ends_here = [id](const LoopMeasurement& loop) {
+      return loop.query_id == id || loop.match_id == id;
+    };
+    std::erase_if(pending_, ends_here);
+    std::erase_if(loops_, ends_here);
+    std::erase(recent_, id);
+  }
+}
+
+MapReplica::Connections LoopCloser::loop_connections() const {
+  MapReplica::Connections connections;
+  for (const auto& loop : loops_) connections.emplace_back(loop.query_id, loop.match_id);
+  return connections;
+}
+
+VerificationTask LoopCloser::detect(KeyframeId id) const {
+  VerificationTask task;
+  task.query_id = id;
+  const auto* keyframe = map_.find(id);
+  if (keyframe == nullptr) return task;
+  task.query = keyframe->features;
+  auto scores = index_.query(*keyframe->features);
+
+  // What the map connects closely with the query is no loop, but shows how well places score here.
+  auto near = map_.path_lengths(id, config_.min_path_m, {});
+  for (const auto& [other, shared] : keyframe->shared_landmarks) near.emplace(other, 0.0);
+  double reference = 0.0;
+  for (const auto& score : scores) {
+    if (score.keyframe_id != id && near.contains(score.keyframe_id)) {
+      reference = std::max(reference, score.score);
+    }
+  }
+  std::erase_if(scores, [&](const PlaceScore& score) {
+    return near.contains(score.keyframe_id) || score.score < config_.min_score_ratio * reference ||
+           score.matches < config_.verification.min_matches;
+  });
+  task.candidates = best_places(scores, size_of(config_.max_places));
+  return task;
+}
+
+VerificationTask LoopCloser::detect_lost(
+    std::shared_ptr<const features::FrameFeatures> frame) const {
+  VerificationTask task;
+  task.query = std::move(frame);
+  task.candidates = best_places(index_.query(*task.query), size_of(config_.max_places_lost));
+  return task;
+}
+
+/// Keyframes of one place support each other: the best of each group of neighbours, ordered by
+/// what the group has together.
+std::vector<VerificationTask::Candidate> LoopCloser::best_places(
+    const std::vector<PlaceScore>& scores, std::size_t count) const {
+  std::map<KeyframeId, double> score_of;
+  for (const auto& score : scores) score_of[score.keyframe_id] = score.score;
+  struct Group {
+    PlaceScore best;
+    double score;
+  };
+  std::vector<Group> groups;
+  std::set<KeyframeId> grouped;
+  for (const auto& score : scores) {  // best first
+    if (grouped.contains(score.keyframe_id)) continue;
+    Group group{score, score.score};
+    grouped.insert(score.keyframe_id);
+    for (const auto neighbour : map_.neighbours(score.keyframe_id, 10)) {
+      const auto found = score_of.find(neighbour);
+      if (found != score_of.end() && grouped.insert(neighbour).second) group.score += found->second;
+    }
+    groups.push_back(group);
+  }
+  std::stable_sort(groups.begin(), groups.end(), [](const Group& a, const Group& b) {
+    return a.score > b.score;
+  });
+  std::vector<VerificationTask::Candidate> candidates;
+  for (std::size_t i = 0; i < std::min(count, groups.size()); ++i) {
+    candidates.push_back(candidate(groups[i].best));
+  }
+  return candidates;
+}
+
+VerificationTask::Candidate LoopCloser::candidate(const PlaceScore& score) const {
+  VerificationTask::Candidate result;
+  result.match_id = score.keyframe_id;
+  result.score = score.score;
+  auto views = map_.neighbours(score.keyframe_id, size_of(config_.views_per_place) - 1);
+  views.insert(views.begin(), score.keyframe_id);
+  for (const auto id : views) {
+    result.features.push_back(map_.find(id)->features);
+    result.T_match_camera.push_back(map_.relative_pose(score.keyframe_id, id));
+  }
+  return result;
+}
+
+std::optional<CorrectionTask> LoopCloser::consider(KeyframeId id,
+                                                   const std::vector<VerifiedPlace>& places) {
+  forget_old(id);
+  bool accepted = false;
+  LoopMeasurement newest;
+  for (const auto& measurement : plausible_measurements(id, places)) {
+    const auto set = agreeing(measurement);
+    pending_.push_back(measurement);
+    std::set<KeyframeId> queries;
+    for (const auto& loop : set) queries.insert(loop.query_id);
+    if (queries.size() < size_of(config_.consistent_queries)) continue;
+    accepted = true;
+    newest = measurement;
+    for (const auto& loop : set) {
+      const auto same = [&](const LoopMeasurement& other) { return same_loop(loop, other); };
+      std::erase_if(pending_, same);
+      if (std::any_of(loops_.begin(), loops_.end(), same)) continue;
+      loops_.push_back(loop);
+      ++statistics_.loops;
+    }
+  }
+  if (!accepted || !due(newest)) return std::nullopt;
+  keyframes_since_correction_ = 0;
+  ++statistics_.corrections;
+  return correction_task(newest);
+}
+
+/// Measurements that the map's drift allows; none when they contradict each other.
+std::vector<LoopMeasurement> LoopCloser::plausible_measurements(
+    KeyframeId id, const std::vector<VerifiedPlace>& places) {
+  std::vector<LoopMeasurement> measurements;
+  std::map<KeyframeId, double> paths_m;
+  for (const auto& place : places) {
+    ++statistics_.places_verified;
+    const bool known = map_.find(id) != nullptr && map_.find(place.match_id) != nullptr;
+    if (!known || place.verification.status != VerificationStatus::kOk) continue;
+    ++statistics_.places_confirmed;
+    if (paths_m.empty()) {
+      paths_m = map_.path_lengths(id, std::numeric_limits<double>::infinity(), loop_connections());
+    }
+    const LoopMeasurement measurement{id,
+                                      place.match_id,
+                                      place.verification.T_place_query,
+                                      place.verification.covariance_query,
+                                      place.verification.inliers};
+    const auto path_m = paths_m.find(place.match_id);
+    if (path_m != paths_m.end() &&
+        !plausible(
+            measurement, map_.relative_pose(place.match_id, id), path_m->second, config_.drift)) {
+      ++statistics_.implausible;
+      continue;
+    }
+    measurements.push_back(measurement);
+  }
+  for (std::size_t i = 1; i < measurements.size(); ++i) {
+    if (agree(measurements[0], measurements[i])) continue;
+    ++statistics_.ambiguous;
+    return {};
+  }
+  return measurements;
+}
+
+bool LoopCloser::agree(const LoopMeasurement& a, const LoopMeasurement& b) const {
+  constexpr double kFar_m = 1e3;
+  const auto length = [&](KeyframeId from, KeyframeId to) {
+    if (from == to) return 0.0;
+    const double straight_m = map_.relative_pose(from, to).translation().norm();
+    const auto paths_m = map_.path_lengths(from, 10.0 + 3.0 * straight_m, loop_connections());
+    const auto found = paths_m.find(to);
+    return found == paths_m.end() ? kFar_m : found->second;
+  };
+  LoopPair pair;
+  pair.a = &a;
+  pair.b = &b;
+  pair.T_query_a_query_b = map_.relative_pose(a.query_id, b.query_id);
+  pair.T_match_a_match_b = map_.relative_pose(a.match_id, b.match_id);
+  pair.query_path_m = length(a.query_id, b.query_id);
+  pair.match_path_m = length(a.match_id, b.match_id);
+  return consistent(pair, config_.drift);
+}
+
+/// The largest set of recent measurements that agree with the newest and with one another.
+std::vector<LoopMeasurement> LoopCloser::agreeing(const LoopMeasurement& newest) const {
+  std::vector<LoopMeasurement> others;
+  const std::set<KeyframeId> recent(recent_.begin(), recent_.end());
+  for (const auto* list : {&pending_, &loops_}) {
+    for (const auto& loop : *list) {
+      if (recent.contains(loop.query_id) && agree(newest, loop)) others.push_back(loop);
+    }
+  }
+  std::vector<std::vector<bool>> adjacent(others.size(), std::vector<bool>(others.size(), false));
+  for (std::size_t i = 0; i < others.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j)
+      adjacent[i][j] = adjacent[j][i] = agree(others[i], others[j]);
+  }
+  std::vector<LoopMeasurement> set = {newest};
+  for (const auto index : maximum_clique(adjacent)) set.push_back(others[index]);
+  return set;
+}
+
+void LoopCloser::forget_old(KeyframeId newest) {
+  const std::set<KeyframeId> recent(recent_.begin(), recent_.end());
+  std::erase_if(pending_, [&](const LoopMeasurement& loop) {
+    return loop.query_id != newest && !recent.contains(loop.query_id);
+  });
+}
+
+bool LoopCloser::due(const LoopMeasurement& newest) const {
+  if (keyframes_since_correction_ >= config_.correction_interval) return true;
+  const SE3 T = map_.relative_pose(newest.match_id, newest.query_id);
+  const Vector6d error = geometry::local(T, newest.T_match_query);
+  const auto sigma = path_sigma(0.0, config_.drift);
+  return error.head<3>().norm() > config_.urgent_sigma * sigma.rotation_rad ||
+         error.tail<3>().norm() > config_.urgent_sigma * sigma.translation_m;
+}
+
+CorrectionTask LoopCloser::correction_task(const LoopMeasurement& newest) const {
+  return build_correction(map_, loops_, newest, config_);
+}
+
+void LoopCloser::finish(const Correction& correction) {
+  for (const auto& [query, match] : correction.rejected_loops) {
+    statistics_.loops_left_out += std::erase_if(loops_, [&](const LoopMeasurement& loop) {
+      return loop.query_id == query && loop.match_id == match;
+    });
+  }
+}
+
+std::optional<Relocalisation> LoopCloser::relocalise(
+    const std::vector<VerifiedPlace>& places) const {
+  const VerifiedPlace* best = nullptr;
+  for (const auto& place : places) {
+    const bool usable = place.verification.status == VerificationStatus::kOk &&
+                        place.verification.inliers >= config_.min_inliers_lost &&
+                        map_.find(place.match_id) != nullptr;
+    if (!usable) continue;
+    if (best == nullptr || place.verification.inliers > best->verification.inliers) best = &place;
+  }
+  if (best == nullptr) return std::nullopt;
+  const SE3 T_map_camera =
+      map_.find(best->match_id)->T_map_camera * best->verification.T_place_query;
+  for (const auto& place : places) {
+    if (&place == best || place.verification.status != VerificationStatus::kOk) continue;
+    const auto* keyframe = map_.find(place.match_id);
+    if (keyframe == nullptr) continue;
+    const SE3 T_other = keyframe->T_map_camera * place.verification.T_place_query;
+    const Vector6d error = geometry::local(T_map_camera, T_other);
+    if (error.head<3>().norm() > config_.same_pose_deg * std::numbers::pi / 180.0 ||
+        error.tail<3>().norm() > config_.same_pose_m) {
+      return std::nullopt;
+    }
+  }
+  Relocalisation answer;
+  answer.T_map_camera = T_map_camera;
+  answer.covariance_camera = best->verification.covariance_query;
+  answer.inliers = best->verification.inliers;
+  answer.keyframe_ids = map_.neighbours(best->match_id, 31);
+  answer.keyframe_ids.insert(answer.keyframe_ids.begin(), best->match_id);
+  return answer;
+}
+
+std::vector<VerifiedPlace> verify(const VerificationTask& task,
+                                  const optimization::PinholeCamera& camera,
+                                  const VerificationConfig& config) {
+  std::vector<VerifiedPlace> places;
+  for (const auto& candidate : task.candidates) {
+    Place place;
+    for (std::size_t i = 0; i < candidate.features.size(); ++i) {
+      place.push_back({candidate.features[i].get(), candidate.T_match_camera[i]});
+    }
+    places.push_back(
+        {candidate.match_id, candidate.score, verify(*task.query, place, camera, config)});
+  }
+  return places;
+}
+
+}  // namespace camvox::loop

@@ -1,0 +1,132 @@
+#include "camvox/loop/map_replica.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <queue>
+#include <stdexcept>
+#include <string>
+
+namespace camvox::loop {
+namespace {
+
+using geometry::SE3;
+
+/// Keyframes that share fewer landmarks are not connected by them.
+constexpr int kMinShared = 15;
+
+}  // namespace
+
+void MapReplica::insert(const tracking::Keyframe& keyframe) {
+  auto& mine = keyframes_[keyframe.id];
+  mine.features = std::make_shared<const features::FrameFeatures>(keyframe.features);
+  mine.T_map_camera = keyframe.T_map_camera;
+  mine.covariance = keyframe.covariance_camera;
+  if (mine.parent == 0 && keyframe.parent_id != keyframe.id) adopt(keyframe.parent_id, keyframe.id);
+}
+
+void MapReplica::adopt(KeyframeId parent, KeyframeId child) {
+  const auto found = keyframes_.find(parent);
+  keyframes_.at(child).parent = found == keyframes_.end() ? 0 : parent;
+  if (found != keyframes_.end()) found->second.children.push_back(child);
+}
+
+void MapReplica::apply(const MapChange& change) {
+  map_epoch_ = std::max(map_epoch_, change.map_epoch);
+  for (const auto& [id, T_map_camera] : change.T_map_camera) {
+    const auto found = keyframes_.find(id);
+    if (found != keyframes_.end()) found->second.T_map_camera = T_map_camera;
+  }
+  for (const auto& edge : change.edges) {
+    const auto a = keyframes_.find(edge.a);
+    const auto b = keyframes_.find(edge.b);
+    if (a == keyframes_.end() || b == keyframes_.end() || a == b) continue;
+    if (edge.shared_landmarks > 0) {
+      a->second.shared_landmarks[edge.b] = edge.shared_landmarks;
+      b->second.shared_landmarks[edge.a] = edge.shared_landmarks;
+    } else {
+      a->second.shared_landmarks.erase(edge.b);
+      b->second.shared_landmarks.erase(edge.a);
+    }
+  }
+  for (const auto id : change.removed) remove(id);
+}
+
+void MapReplica::remove(KeyframeId id) {
+  const auto found = keyframes_.find(id);
+  if (found == keyframes_.end()) return;
+  const Keyframe gone = std::move(found->second);
+  keyframes_.erase(found);
+  for (const auto& [other, shared] : gone.shared_landmarks) {
+    keyframes_.at(other).shared_landmarks.erase(id);
+  }
+  if (const auto parent = keyframes_.find(gone.parent); parent != keyframes_.end()) {
+    std::erase(parent->second.children, id);
+  }
+  for (const auto child : gone.children) adopt(gone.parent, child);
+}
+
+const MapReplica::Keyframe* MapReplica::find(KeyframeId id) const {
+  const auto found = keyframes_.find(id);
+  return found == keyframes_.end() ? nullptr : &found->second;
+}
+
+std::vector<KeyframeId> MapReplica::neighbours(KeyframeId id, std::size_t count) const {
+  const auto* keyframe = find(id);
+  if (keyframe == nullptr) return {};
+  std::vector<std::pair<int, KeyframeId>> shared;
+  for (const auto& [other, landmarks] : keyframe->shared_landmarks) {
+    if (landmarks >= kMinShared) shared.emplace_back(-landmarks, other);
+  }
+  std::sort(shared.begin(), shared.end());
+  std::vector<KeyframeId> result;
+  const auto add = [&](KeyframeId other) {
+    const bool known = std::find(result.begin(), result.end(), other) != result.end();
+    if (other != 0 && !known && result.size() < count) result.push_back(other);
+  };
+  for (const auto& [landmarks, other] : shared) add(other);
+  add(keyframe->parent);
+  for (const auto child : keyframe->children) add(child);
+  return result;
+}
+
+std::map<KeyframeId, double> MapReplica::path_lengths(KeyframeId from,
+                                                      double max_m,
+                                                      const Connections& loops) const {
+  std::map<KeyframeId, std::vector<KeyframeId>> looped;
+  for (const auto& [a, b] : loops) {
+    looped[a].push_back(b);
+    looped[b].push_back(a);
+  }
+  std::map<KeyframeId, double> lengths;
+  using Open = std::pair<double, KeyframeId>;
+  std::priority_queue<Open, std::vector<Open>, std::greater<>> open;
+  open.emplace(0.0, from);
+  while (!open.empty()) {
+    const auto [length_m, id] = open.top();
+    open.pop();
+    const auto* keyframe = find(id);
+    if (keyframe == nullptr || length_m > max_m || !lengths.emplace(id, length_m).second) continue;
+    const auto step = [&](KeyframeId other) {
+      const auto* next = find(other);
+      if (next == nullptr || lengths.contains(other)) return;
+      const double step_m =
+          (next->T_map_camera.translation() - keyframe->T_map_camera.translation()).norm();
+      open.emplace(length_m + step_m, other);
+    };
+    step(keyframe->parent);
+    for (const auto child : keyframe->children) step(child);
+    for (const auto& [other, landmarks] : keyframe->shared_landmarks) {
+      if (landmarks >= kMinShared) step(other);
+    }
+    if (const auto found = looped.find(id); found != looped.end()) {
+      for (const auto other : found->second) open.emplace(length_m, other);
+    }
+  }
+  return lengths;
+}
+
+SE3 MapReplica::relative_pose(KeyframeId from, KeyframeId to) const {
+  return keyframes_.at(from).T_map_camera.inverse() * keyframes_.at(to).T_map_camera;
+}
+
+}  // namespace camvox::loop

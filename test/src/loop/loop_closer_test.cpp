@@ -1,0 +1,153 @@
+#include "camvox/loop/loop_closer.hpp"
+
+#include <gtest/gtest.h>
+
+#include "camvox/test/feature_world.hpp"
+
+namespace camvox::loop {
+namespace {
+
+using geometry::SE3;
+using test::FeatureWorld;
+using test::on_circle;
+
+constexpr double kRadius_m = 20.0;
+
+/// A robot that drives around a circle and on, with odometry that turns too little and measures
+/// too long, and a map that takes every correction over as it is.
+class LoopCloserTest : public testing::Test {
+ protected:
+  LoopCloserTest() {
+    for (int i = 0; i < 60; ++i) {
+      const double angle = i * 2.0 * M_PI / 60.0;
+      world_.add_box(60, on_circle(angle, kRadius_m).translation(), {9.0, 5.0, 9.0});
+    }
+  }
+
+  static SE3 truth(std::size_t i) {
+    return on_circle(static_cast<double>(i) / kRadius_m, kRadius_m);
+  }
+
+  void drive_to(std::size_t i) {
+    tracking::Keyframe keyframe;
+    keyframe.id = poses_.size() + 1;
+    keyframe.parent_id = poses_.size();
+    keyframe.features = world_.look(truth(i), 12.0);
+    keyframe.T_map_camera = truth(i);
+    if (!poses_.empty()) {
+      const SE3 step = truth(last_).inverse() * truth(i);
+      const SE3 wrong(geometry::SO3::exp({0.0, drift_rad_, 0.0}), 0.005 * step.translation());
+      keyframe.T_map_camera = poses_.back() * step * wrong;
+    }
+    last_ = i;
+    poses_.push_back(keyframe.T_map_camera);
+    closer_.insert(keyframe);
+    const auto places =
+        verify(closer_.detect(keyframe.id), world_.camera, closer_.config().verification);
+    const auto task = closer_.consider(keyframe.id, places);
+    if (task) apply(correct(*task));
+  }
+
+  void apply(const Correction& correction) {
+    ASSERT_TRUE(correction.summary.usable);
+    closer_.finish(correction);
+    MapChange change;
+    change.map_epoch = correction.map_epoch + 1;
+    change.T_map_camera = correction.T_map_camera;
+    closer_.update(change);
+    for (const auto& [id, T] : correction.T_map_camera) poses_[id - 1] = T;
+  }
+
+  [[nodiscard]] double error_at_m(std::size_t id, std::size_t i) const {
+    return (poses_[id - 1].translation() - truth(i).translation()).norm();
+  }
+
+  FeatureWorld world_;
+  LoopCloser closer_{LoopCloserConfig()};
+  std::vector<SE3> poses_;
+  std::size_t last_ = 0;
+  double drift_rad_ = 5e-4;
+};
+
+TEST_F(LoopCloserTest, ClosesACircle) {
+  for (std::size_t i = 0; i < 120; ++i) drive_to(i);
+  EXPECT_TRUE(closer_.loops().empty());
+  const double drift_m = error_at_m(120, 119);
+  EXPECT_GT(drift_m, 0.5);
+  for (std::size_t i = 120; i < 140; ++i) drive_to(i);
+  EXPECT_GT(closer_.loops().size(), 5U);
+  EXPECT_GE(closer_.statistics().corrections, 1U);
+  EXPECT_LT(error_at_m(130, 129), 0.3 * drift_m);
+  for (const auto& loop : closer_.loops()) {
+    const SE3 T = truth(loop.match_id - 1).inverse() * truth(loop.query_id - 1);
+    EXPECT_LT(geometry::local(T, loop.T_match_query).norm(), 0.05);
+  }
+}
+
+// Two stretches that look exactly alike. There is nothing to tell them apart but where the robot
+// can be: it has driven 60 m, and the map cannot be wrong by the 40 m between them.
+TEST_F(LoopCloserTest, IdenticalFacadesAreNoLoop) {
+  FeatureWorld twins;
+  for (int i = 0; i < 12; ++i) {
+    twins.add_box(60, on_circle(i * 0.1, kRadius_m).translation(), {9.0, 5.0, 9.0});
+  }
+  const std::size_t size = twins.size();
+  twins.add_copy(0, size, truth(60) * truth(0).inverse());
+  world_ = twins;
+  for (std::size_t i = 0; i < 84; ++i) drive_to(i);
+  EXPECT_GT(closer_.statistics().places_confirmed, 5U);  // they do look alike
+  EXPECT_EQ(closer_.statistics().implausible, closer_.statistics().places_confirmed);
+  EXPECT_TRUE(closer_.loops().empty());
+  EXPECT_EQ(closer_.statistics().corrections, 0U);
+}
+
+TEST_F(LoopCloserTest, RelocalisesAnywhere) {
+  drift_rad_ = 0.0;
+  for (std::size_t i = 0; i < 110; i += 2) drive_to(i);
+  for (const std::size_t i : {5U, 37U, 91U}) {
+    const SE3 T = truth(i) * SE3(geometry::SO3::exp({0.0, 0.1, 0.0}), {0.3, 0.1, 0.0});
+    const auto frame = std::make_shared<features::FrameFeatures>(world_.look(T, 12.0));
+    const auto answer = closer_.relocalise(
+        verify(closer_.detect_lost(frame), world_.camera, closer_.config().verification));
+    ASSERT_TRUE(answer);
+    const auto* keyframe = closer_.map().find(answer->keyframe_ids.front());
+    ASSERT_NE(keyframe, nullptr);
+    const SE3 T_keyframe = truth(2 * (answer->keyframe_ids.front() - 1)).inverse() * T;
+    EXPECT_LT(
+        geometry::local(T_keyframe, keyframe->T_map_camera.inverse() * answer->T_map_camera).norm(),
+        0.05);
+  }
+}
+
+TEST_F(LoopCloserTest, DoesNotGuessBetweenTwins) {
+  FeatureWorld twins;
+  twins.add_box(700, on_circle(0.3, kRadius_m).translation(), {9.0, 5.0, 16.0});
+  twins.add_copy(0, twins.size(), truth(60) * truth(0).inverse());
+  world_ = twins;
+  for (std::size_t i = 0; i < 70; ++i) drive_to(i);
+  const auto frame = std::make_shared<features::FrameFeatures>(world_.look(truth(1), 12.0));
+  EXPECT_FALSE(closer_.relocalise(
+      verify(closer_.detect_lost(frame), world_.camera, closer_.config().verification)));
+}
+
+TEST_F(LoopCloserTest, ForgetsRemovedKeyframes) {
+  for (std::size_t i = 0; i < 135; ++i) drive_to(i);
+  ASSERT_FALSE(closer_.loops().empty());
+  MapChange change;
+  change.removed = {closer_.loops().front().match_id};
+  closer_.update(change);
+  EXPECT_EQ(closer_.map().find(change.removed[0]), nullptr);
+  EXPECT_EQ(closer_.index().keyframes(), 134U);
+  for (const auto& loop : closer_.loops()) EXPECT_NE(loop.match_id, change.removed[0]);
+}
+
+TEST_F(LoopCloserTest, NothingIsKnownAtFirst) {
+  EXPECT_TRUE(closer_.detect(1).candidates.empty());
+  const auto frame = std::make_shared<features::FrameFeatures>();
+  EXPECT_TRUE(closer_.detect_lost(frame).candidates.empty());
+  EXPECT_FALSE(closer_.relocalise({}));
+  EXPECT_FALSE(closer_.consider(1, {}));
+}
+
+}  // namespace
+}  // namespace camvox::loop
