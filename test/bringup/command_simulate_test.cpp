@@ -37,6 +37,23 @@ std::string content(const fs::path& path) {
   return text.str();
 }
 
+/// All messages of a topic.
+template <typename T>
+std::vector<T> messages(const fs::path& bag, const std::string& topic) {
+  auto reader = storage::BagReader::open(bag);
+  EXPECT_TRUE(reader.ok());
+  std::vector<T> found;
+  auto cursor = (*reader)->messages();
+  while (const auto* message = cursor.next()) {
+    if ((*reader)->topics()[message->topic].name != topic) continue;
+    EXPECT_TRUE(interfaces::message_type<T>().read_cdr(
+        reinterpret_cast<const std::uint8_t*>(message->data.data()),
+        message->data.size(),
+        &found.emplace_back()));
+  }
+  return found;
+}
+
 /// Simulates a small camera: quick, and everything else as on the rig.
 class CommandSimulate : public CommandFixture {
  protected:
@@ -64,23 +81,6 @@ class CommandSimulate : public CommandFixture {
     const auto process = begin(words);
     const int code = process->wait(kPatience);
     return {code, process->output()};
-  }
-
-  /// All messages of a topic.
-  template <typename T>
-  [[nodiscard]] static std::vector<T> messages(const fs::path& bag, const std::string& topic) {
-    auto reader = storage::BagReader::open(bag);
-    EXPECT_TRUE(reader.ok());
-    std::vector<T> found;
-    auto cursor = (*reader)->messages();
-    while (const auto* message = cursor.next()) {
-      if ((*reader)->topics()[message->topic].name != topic) continue;
-      EXPECT_TRUE(interfaces::message_type<T>().read_cdr(
-          reinterpret_cast<const std::uint8_t*>(message->data.data()),
-          message->data.size(),
-          &found.emplace_back()));
-    }
-    return found;
   }
 
   /// Nothing that looks like a bag is left.
@@ -117,89 +117,110 @@ std::int64_t stamp_ns(const auto& message) {
   return std::int64_t{1'000'000'000} * stamp.sec() + stamp.nanosec();
 }
 
+/// Compares a bag's topics, message by message, with what the simulator says.
+class Comparison {
+ public:
+  explicit Comparison(const fs::path& bag)
+      : images_(messages<sensor_msgs::msg::Image>(bag, "/camera/image_raw")),
+        infos_(messages<sensor_msgs::msg::CameraInfo>(bag, "/camera/camera_info")),
+        depths_(messages<sensor_msgs::msg::Image>(bag, "/ground_truth/depth/image_raw")),
+        scans_(messages<livox_ros_driver2::msg::CustomMsg>(bag, "/livox/lidar")),
+        points_(messages<sensor_msgs::msg::PointCloud2>(bag, "/ground_truth/points")),
+        imus_(messages<sensor_msgs::msg::Imu>(bag, "/livox/imu")),
+        biases_(messages<sensor_msgs::msg::Imu>(bag, "/ground_truth/imu_bias")),
+        fixes_(messages<sensor_msgs::msg::NavSatFix>(bag, "/gnss/fix")),
+        truths_(messages<nav_msgs::msg::Odometry>(bag, "/ground_truth/odometry")) {}
+
+  void next(const simulation::SimulatedFrame& frame) {
+    const auto& image = images_.at(image_);
+    EXPECT_EQ(image.encoding(), "rgb8");
+    EXPECT_EQ(image.step(), 3U * 152U);
+    EXPECT_EQ(image.data(), frame.image.rgb);
+    EXPECT_EQ(stamp_ns(image), frame.stamp_ns);
+    EXPECT_EQ(stamp_ns(infos_.at(image_)), frame.stamp_ns);
+    EXPECT_THAT(infos_.at(image_).d(), ElementsAre(-0.12, 0.1162, 0.0, 0.0, 0.0));
+    EXPECT_EQ(infos_.at(image_).k()[2], 79.0);
+    const auto& depth = depths_.at(image_++);
+    EXPECT_EQ(depth.encoding(), "32FC1");
+    ASSERT_EQ(depth.data().size(), 4 * frame.depth.z_m.size());
+    EXPECT_EQ(std::memcmp(depth.data().data(), frame.depth.z_m.data(), depth.data().size()), 0);
+  }
+
+  void next(const simulation::LidarScan& sent) {
+    const auto& scan = scans_.at(scan_);
+    const auto& points = points_.at(scan_++);
+    EXPECT_EQ(scan.timebase(), static_cast<std::uint64_t>(sent.stamp_ns));
+    EXPECT_EQ(stamp_ns(scan), sent.stamp_ns);
+    ASSERT_EQ(scan.point_num(), sent.points.size());
+    ASSERT_EQ(scan.points().size(), sent.points.size());
+    ASSERT_EQ(points.width(), sent.points.size());
+    for (std::size_t i = 0; i < sent.points.size(); i += 97) {
+      const auto& read = scan.points()[i];
+      EXPECT_EQ(read.offset_time(), sent.points[i].offset_ns);
+      EXPECT_EQ(Eigen::Vector3f(read.x(), read.y(), read.z()), sent.points[i].p_lidar);
+      EXPECT_EQ(read.reflectivity(), sent.points[i].reflectivity);
+      EXPECT_EQ(read.tag(), sent.points[i].tag);
+      EXPECT_EQ(read.line(), sent.points[i].line);
+      EXPECT_EQ(std::memcmp(&points.data()[16 * i], sent.truth[i].p_lidar_stamp.data(), 12), 0);
+    }
+  }
+
+  void next(const simulation::ImuSample& sample) {
+    const auto& imu = imus_.at(imu_);
+    EXPECT_EQ(stamp_ns(imu), sample.stamp_ns);
+    EXPECT_EQ(imu.angular_velocity().z(), sample.omega_rad_s.z());
+    EXPECT_EQ(imu.linear_acceleration().y(), sample.force_m_s2.y());
+    EXPECT_EQ(imu.orientation_covariance()[0], -1.0);
+    EXPECT_EQ(biases_.at(imu_++).angular_velocity().x(), sample.gyro_bias_rad_s.x());
+  }
+
+  void next(const simulation::GnssSample& sample) {
+    const auto& fix = fixes_.at(fix_++);
+    EXPECT_EQ(stamp_ns(fix), sample.stamp_ns);
+    EXPECT_EQ(fix.latitude(), sample.fix.latitude_deg);
+    EXPECT_NEAR(fix.position_covariance()[8], 4e-4, 1e-12);
+  }
+
+  void next(const simulation::TruthState& state) {
+    const auto& truth = truths_.at(truth_++);
+    EXPECT_EQ(stamp_ns(truth), state.stamp_ns);
+    EXPECT_EQ(truth.header().frame_id(), "world");
+    EXPECT_EQ(truth.pose().pose().position().x(), state.body.T_world_body.translation().x());
+  }
+
+  void expect_all_seen() const {
+    EXPECT_EQ(image_, 5U);
+    EXPECT_GE(scan_, 4U);
+    EXPECT_EQ(image_, images_.size());
+    EXPECT_EQ(scan_, scans_.size());
+    EXPECT_EQ(imu_, imus_.size());
+    EXPECT_EQ(fix_, fixes_.size());
+    EXPECT_EQ(truth_, truths_.size());
+  }
+
+ private:
+  std::vector<sensor_msgs::msg::Image> images_;
+  std::vector<sensor_msgs::msg::CameraInfo> infos_;
+  std::vector<sensor_msgs::msg::Image> depths_;
+  std::vector<livox_ros_driver2::msg::CustomMsg> scans_;
+  std::vector<sensor_msgs::msg::PointCloud2> points_;
+  std::vector<sensor_msgs::msg::Imu> imus_;
+  std::vector<sensor_msgs::msg::Imu> biases_;
+  std::vector<sensor_msgs::msg::NavSatFix> fixes_;
+  std::vector<nav_msgs::msg::Odometry> truths_;
+  std::size_t image_ = 0, scan_ = 0, imu_ = 0, fix_ = 0, truth_ = 0;
+};
+
 TEST_F(CommandSimulate, WritesWhatTheSimulatorSays) {
   const auto result = simulate(bag("one"), {"--images", "raw", "--truth-depth", "--truth-points"});
   ASSERT_EQ(result.exit_code, 0) << result.output;
   EXPECT_THAT(result.output, HasSubstr("/livox/lidar"));
-  const auto images = messages<sensor_msgs::msg::Image>(bag("one"), "/camera/image_raw");
-  const auto infos = messages<sensor_msgs::msg::CameraInfo>(bag("one"), "/camera/camera_info");
-  const auto depths =
-      messages<sensor_msgs::msg::Image>(bag("one"), "/ground_truth/depth/image_raw");
-  const auto scans = messages<livox_ros_driver2::msg::CustomMsg>(bag("one"), "/livox/lidar");
-  const auto points = messages<sensor_msgs::msg::PointCloud2>(bag("one"), "/ground_truth/points");
-  const auto imus = messages<sensor_msgs::msg::Imu>(bag("one"), "/livox/imu");
-  const auto biases = messages<sensor_msgs::msg::Imu>(bag("one"), "/ground_truth/imu_bias");
-  const auto fixes = messages<sensor_msgs::msg::NavSatFix>(bag("one"), "/gnss/fix");
-  const auto truths = messages<nav_msgs::msg::Odometry>(bag("one"), "/ground_truth/odometry");
-  EXPECT_EQ(images.size(), 5U);
-  ASSERT_EQ(infos.size(), images.size());
-  ASSERT_EQ(depths.size(), images.size());
-  ASSERT_EQ(points.size(), scans.size());
-
+  Comparison bag_says(bag("one"));
   simulation::Simulator simulator(options_of(bag("one")), 2);
-  std::size_t image = 0, scan = 0, imu = 0, fix = 0, truth = 0;
   while (const auto event = simulator.next()) {
-    if (const auto* frame = std::get_if<simulation::SimulatedFrame>(&event->message)) {
-      ASSERT_LT(image, images.size());
-      EXPECT_EQ(images[image].encoding(), "rgb8");
-      EXPECT_EQ(images[image].step(), 3U * 152U);
-      EXPECT_EQ(images[image].data(), frame->image.rgb);
-      EXPECT_EQ(stamp_ns(images[image]), frame->stamp_ns);
-      EXPECT_EQ(stamp_ns(infos[image]), frame->stamp_ns);
-      EXPECT_THAT(infos[image].d(), ElementsAre(-0.12, 0.1162, 0.0, 0.0, 0.0));
-      EXPECT_EQ(infos[image].k()[2], 79.0);
-      ASSERT_EQ(depths[image].data().size(), 4 * frame->depth.z_m.size());
-      EXPECT_EQ(
-          std::memcmp(
-              depths[image].data().data(), frame->depth.z_m.data(), depths[image].data().size()),
-          0);
-      ++image;
-    } else if (const auto* sent = std::get_if<simulation::LidarScan>(&event->message)) {
-      ASSERT_LT(scan, scans.size());
-      EXPECT_EQ(scans[scan].timebase(), static_cast<std::uint64_t>(sent->stamp_ns));
-      EXPECT_EQ(stamp_ns(scans[scan]), sent->stamp_ns);
-      ASSERT_EQ(scans[scan].point_num(), sent->points.size());
-      ASSERT_EQ(scans[scan].points().size(), sent->points.size());
-      ASSERT_EQ(points[scan].width(), sent->points.size());
-      for (std::size_t i = 0; i < sent->points.size(); i += 97) {
-        const auto& read = scans[scan].points()[i];
-        EXPECT_EQ(read.offset_time(), sent->points[i].offset_ns);
-        EXPECT_EQ(Eigen::Vector3f(read.x(), read.y(), read.z()), sent->points[i].p_lidar);
-        EXPECT_EQ(read.reflectivity(), sent->points[i].reflectivity);
-        EXPECT_EQ(read.tag(), sent->points[i].tag);
-        EXPECT_EQ(read.line(), sent->points[i].line);
-        EXPECT_EQ(
-            std::memcmp(&points[scan].data()[16 * i], sent->truth[i].p_lidar_stamp.data(), 12), 0);
-      }
-      ++scan;
-    } else if (const auto* sample = std::get_if<simulation::ImuSample>(&event->message)) {
-      ASSERT_LT(imu, imus.size());
-      EXPECT_EQ(stamp_ns(imus[imu]), sample->stamp_ns);
-      EXPECT_EQ(imus[imu].angular_velocity().z(), sample->omega_rad_s.z());
-      EXPECT_EQ(imus[imu].linear_acceleration().y(), sample->force_m_s2.y());
-      EXPECT_EQ(imus[imu].orientation_covariance()[0], -1.0);
-      EXPECT_EQ(biases[imu].angular_velocity().x(), sample->gyro_bias_rad_s.x());
-      ++imu;
-    } else if (const auto* gnss = std::get_if<simulation::GnssSample>(&event->message)) {
-      ASSERT_LT(fix, fixes.size());
-      EXPECT_EQ(stamp_ns(fixes[fix]), gnss->stamp_ns);
-      EXPECT_EQ(fixes[fix].latitude(), gnss->fix.latitude_deg);
-      EXPECT_NEAR(fixes[fix].position_covariance()[8], 4e-4, 1e-12);
-      ++fix;
-    } else if (const auto* state = std::get_if<simulation::TruthState>(&event->message)) {
-      ASSERT_LT(truth, truths.size());
-      EXPECT_EQ(stamp_ns(truths[truth]), state->stamp_ns);
-      EXPECT_EQ(truths[truth].header().frame_id(), "world");
-      EXPECT_EQ(truths[truth].pose().pose().position().x(),
-                state->body.T_world_body.translation().x());
-      ++truth;
-    }
+    std::visit([&](const auto& message) { bag_says.next(message); }, event->message);
   }
-  EXPECT_EQ(imu, imus.size());
-  EXPECT_EQ(fix, fixes.size());
-  EXPECT_EQ(truth, truths.size());
-  EXPECT_EQ(scan, scans.size());
-  EXPECT_GE(scan, 4U);
+  bag_says.expect_all_seen();
 }
 
 TEST_F(CommandSimulate, JpegIsThePresetAndDecodes) {
