@@ -40,7 +40,8 @@ Tracker::Tracker(const TrackerConfig& config,
       camera_(camera),
       T_body_camera_(T_body_camera),
       map_(camera.pinhole, camera.scale),
-      T_odom_camera_(T_body_camera) {
+      T_odom_camera_(T_body_camera),
+      frames_since_request_(config.relocalisation_interval) {
   config::require_valid(config, "tracking");
   camera_.pinhole.virtual_baseline_m = config.virtual_baseline_m;
   if (config.localisation_only || config.relocalise_at_start) state_ = TrackingState::kLost;
@@ -202,9 +203,9 @@ void Tracker::lose(Frame& frame, FrameResult& result) {
 }
 
 void Tracker::relocalise(const RelocalisationHint& hint) {
-  const bool expected = requested_frame_id_ == hint.frame_id && !is_tracked();
+  if (requested_frame_id_ != hint.frame_id) return;
   requested_frame_id_.reset();
-  if (!expected || (!map_.empty() && hint.map_epoch < map_.map_epoch())) return;
+  if (is_tracked() || (!map_.empty() && hint.map_epoch < map_.map_epoch())) return;
   state_ = TrackingState::kRelocalising;
   frames_lost_ = 0;
   reference_id_ = hint.keyframe_id;

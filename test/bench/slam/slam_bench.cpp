@@ -12,10 +12,10 @@
 #include <opencv2/imgproc.hpp>
 
 #include "camvox/mapping/mapper.hpp"
+#include "camvox/test/founded_map.hpp"
 #include "camvox/tracking/frame_builder.hpp"
 #include "camvox/tracking/tracker.hpp"
 #include "evaluation.hpp"
-#include "founded_map.hpp"
 #include "recording.hpp"
 
 namespace camvox::bench {
@@ -135,7 +135,7 @@ class Run {
   const Recording& recording_;
   tracking::FrameBuilder builder_;
   tracking::Tracker tracker_;
-  FoundedMap founded_;
+  test::FoundedMap founded_;
   mapping::Mapper mapper_;
   DepthSource depth_source_;
   cv::Ptr<cv::ORB> orb_;

@@ -6,7 +6,7 @@
 #include "camvox/tracking/local_map.hpp"
 #include "camvox/tracking/tracker_config.hpp"
 
-namespace camvox::bench {
+namespace camvox::test {
 
 /// The map without mapping: landmarks stay as they were founded, and the local map is what the
 /// latest keyframes founded. To see what tracking does by itself.
@@ -49,4 +49,4 @@ class FoundedMap {
   std::map<tracking::KeyframeId, std::vector<tracking::Landmark>> landmarks_;
 };
 
-}  // namespace camvox::bench
+}  // namespace camvox::test

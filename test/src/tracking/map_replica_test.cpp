@@ -1,0 +1,120 @@
+#include "camvox/tracking/map_replica.hpp"
+
+#include <gtest/gtest.h>
+
+namespace camvox::tracking {
+namespace {
+
+using geometry::SE3;
+using geometry::SO3;
+
+constexpr optimization::PinholeCamera kCamera{500.0, 500.0, 320.0, 240.0, 0.05};
+
+Landmark landmark(LandmarkId id, double x_m) {
+  Landmark landmark;
+  landmark.id = id;
+  landmark.p_map = {x_m, 0.0, 0.0};
+  landmark.f_map = {1.0F, 0.0F, 0.0F};
+  return landmark;
+}
+
+LocalMap local_map(std::uint64_t frame_id,
+                   std::uint64_t epoch,
+                   const std::vector<LandmarkId>& ids) {
+  LocalMap map;
+  map.frame_id = frame_id;
+  map.map_epoch = epoch;
+  map.keyframes = {{1, SE3()}};
+  map.next_keyframe_id = 2;
+  for (const auto id : ids) map.landmarks.push_back(landmark(id, static_cast<double>(id)));
+  return map;
+}
+
+/// Two features: a new landmark with depth 4 m, and a known landmark.
+Keyframe keyframe(KeyframeId id, std::uint64_t frame_id) {
+  Keyframe keyframe;
+  keyframe.id = id;
+  keyframe.frame_id = frame_id;
+  keyframe.parent_id = 1;
+  keyframe.T_parent_camera = SE3(SO3(), {0.0, 0.0, 1.0});
+  keyframe.T_map_camera = keyframe.T_parent_camera;
+  keyframe.features.key_points.resize(2);
+  keyframe.features.undistorted_px = {{320.0F, 240.0F}, {100.0F, 100.0F}};
+  keyframe.features.descriptors.resize(2);
+  keyframe.features.depth_m = {4.0F, 5.0F};
+  keyframe.features.depth_sigma_m = {0.02F, 0.02F};
+  keyframe.landmark_ids = {landmark_id(id, 0), 77};
+  return keyframe;
+}
+
+class MapReplicaTest : public testing::Test {
+ protected:
+  MapReplica replica_{kCamera, ScaleLevels()};
+};
+
+TEST_F(MapReplicaTest, IsEmptyAtFirst) {
+  EXPECT_TRUE(replica_.empty());
+  EXPECT_FALSE(replica_.find(1));
+  EXPECT_FALSE(replica_.T_map_keyframe(1));
+  EXPECT_EQ(replica_.next_keyframe_id(), 1U);
+  EXPECT_FALSE(replica_.apply(LocalMap()));
+}
+
+TEST_F(MapReplicaTest, NewLandmarksAreThereAtOnceAndStayUntilMappingHasThem) {
+  ASSERT_TRUE(replica_.apply(local_map(10, 0, {5, 77})));
+  replica_.add(keyframe(2, 12));
+  EXPECT_EQ(replica_.landmarks().size(), 3U);
+  const auto own = replica_.find(landmark_id(2, 0));
+  ASSERT_TRUE(own);
+  EXPECT_LT((replica_.landmarks()[*own].p_map - Eigen::Vector3d(0.0, 0.0, 5.0)).norm(), 1e-12);
+  EXPECT_EQ(replica_.next_keyframe_id(), 3U);
+  EXPECT_EQ(replica_.pending_count(), 1U);
+
+  // Mapping is one frame behind: the keyframe is not in its map yet.
+  ASSERT_TRUE(replica_.apply(local_map(11, 0, {5, 77})));
+  EXPECT_TRUE(replica_.find(landmark_id(2, 0)));
+  EXPECT_TRUE(replica_.T_map_keyframe(2));
+  // Now it has seen the keyframe, and dropped what it founded.
+  ASSERT_TRUE(replica_.apply(local_map(12, 0, {5, 77})));
+  EXPECT_FALSE(replica_.find(landmark_id(2, 0)));
+  EXPECT_EQ(replica_.pending_count(), 0U);
+}
+
+TEST_F(MapReplicaTest, PendingKeyframesMoveWithTheirParent) {
+  ASSERT_TRUE(replica_.apply(local_map(10, 0, {5})));
+  replica_.add(keyframe(2, 12));
+  LocalMap moved = local_map(11, 1, {5});
+  const SE3 T_new_old(SO3::exp({0.0, 0.2, 0.0}), {1.0, 2.0, 3.0});
+  moved.keyframes[0].T_map_camera = T_new_old;
+  ASSERT_TRUE(replica_.apply(moved));
+  const Eigen::Vector3d p_map = replica_.landmarks()[*replica_.find(landmark_id(2, 0))].p_map;
+  EXPECT_LT((p_map - T_new_old * Eigen::Vector3d(0.0, 0.0, 5.0)).norm(), 1e-12);
+  EXPECT_LT(
+      geometry::local(*replica_.T_map_keyframe(2), T_new_old * SE3(SO3(), {0.0, 0.0, 1.0})).norm(),
+      1e-12);
+}
+
+TEST_F(MapReplicaTest, OlderMapsAreIgnored) {
+  ASSERT_TRUE(replica_.apply(local_map(10, 1, {5})));
+  EXPECT_FALSE(replica_.apply(local_map(9, 1, {6})));
+  EXPECT_FALSE(replica_.apply(local_map(11, 0, {6})));
+  EXPECT_TRUE(replica_.find(5));
+}
+
+TEST_F(MapReplicaTest, BansWhatDisagreesAndRemembersItFromMapToMap) {
+  ASSERT_TRUE(replica_.apply(local_map(10, 0, {5, 6, 7})));
+  const auto index = *replica_.find(6);
+  replica_.judge(index, false);
+  replica_.judge(index, true);  // an agreement makes up for half a disagreement
+  replica_.judge(index, false);
+  EXPECT_FALSE(replica_.is_banned(index));
+  replica_.judge(index, false);
+  replica_.judge(index, false);
+  EXPECT_TRUE(replica_.is_banned(index));
+  ASSERT_TRUE(replica_.apply(local_map(11, 0, {1, 2, 6, 9})));
+  EXPECT_TRUE(replica_.is_banned(*replica_.find(6)));
+  EXPECT_EQ(replica_.banned_count(), 1);
+}
+
+}  // namespace
+}  // namespace camvox::tracking
