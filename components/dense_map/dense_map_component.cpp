@@ -1,5 +1,6 @@
 #include "camvox/dense_map/dense_map_component.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <cstring>
 #include <filesystem>
@@ -14,8 +15,9 @@ namespace {
 using sensor_msgs::msg::PointCloud2;
 using sensor_msgs::msg::PointField;
 
-/// Frames whose images wait for the news that they are a keyframe.
-constexpr std::size_t kFramesKept = 4;
+/// Frames whose images wait for the news that they are a keyframe: as long as tracking may take.
+constexpr std::size_t kFramesKept = 8;
+constexpr std::size_t kMaxOpen = 64;
 constexpr std::uint32_t kPointBytes = 16;  // x y z as float, rgb packed into one
 
 void write_points(const std::vector<dense::ColouredPoint>& points, PointCloud2& cloud) {
@@ -64,6 +66,9 @@ DenseMapComponent::DenseMapComponent(Context& context)
   context.subscribe<Keyframe>({"keyframe", topics::kKeyframe},
                               [this](const auto& keyframe) { on_keyframe(*keyframe); },
                               {.qos = qos::kKeyframes});
+  context.subscribe<FramePose>({"frame_pose", topics::kFramePose},
+                               [this](const auto& pose) { on_pose(*pose); },
+                               {.qos = qos::kKeyframes, .required = false});
   context.subscribe<MapUpdate>({"map_update", topics::kMapUpdate},
                                [this](const auto& update) { on_update(*update); },
                                {.qos = qos::kKeyframes, .required = false});
@@ -85,11 +90,29 @@ void DenseMapComponent::keep(std::map<std::uint64_t, Sample<Message>>& frames,
 void DenseMapComponent::on_keyframe(const Keyframe& keyframe) {
   const auto work = progress_.measure();
   const auto frame_id = keyframe.header().frame_id();
+  newest_keyframe_ = std::max(newest_keyframe_, keyframe.id());
   pending_[frame_id] = {keyframe.id(), conversion::to_se3(keyframe.T_map_camera())};
   add_if_complete(frame_id);
   while (pending_.size() > kFramesKept) {
     pending_.erase(pending_.begin());
     context_.diagnostics().set("keyframes without images", ++missed_);
+  }
+  report_done();
+}
+
+void DenseMapComponent::on_pose(const FramePose& pose) {
+  const auto work = progress_.measure();
+  open_.push_back({pose.header(), pose.reference_keyframe_id()});
+  while (open_.size() > kMaxOpen) open_.pop_front();
+  report_done();
+}
+
+/// A frame is done when it is known whether it is a keyframe, and if so, when its points are in.
+void DenseMapComponent::report_done() {
+  while (!open_.empty() && open_.front().reference_id <= newest_keyframe_ &&
+         !pending_.contains(open_.front().header.frame_id())) {
+    progress_.done(open_.front().header);
+    open_.pop_front();
   }
 }
 
@@ -114,10 +137,9 @@ void DenseMapComponent::add_if_complete(std::uint64_t frame_id) {
                         return dense::Rgb{bgr[2], bgr[1], bgr[0]};
                       });
   }
-  const auto header = d.header();
   pending_.erase(keyframe);
-  context_.diagnostics().set("points", map_.size());
-  progress_.done(header);
+  context_.diagnostics().set("points", std::uint64_t{map_.size()});
+  report_done();
 }
 
 void DenseMapComponent::on_update(const MapUpdate& update) {

@@ -15,6 +15,7 @@ namespace {
 
 using camvox_interfaces::msg::DepthImage;
 using camvox_interfaces::msg::FrameImage;
+using camvox_interfaces::msg::FramePose;
 using camvox_interfaces::msg::Keyframe;
 using camvox_interfaces::msg::MapUpdate;
 using camvox_interfaces::msg::Progress;
@@ -66,6 +67,13 @@ class DenseMapTest : public testing::Test {
     });
   }
 
+  void send_pose(std::uint64_t frame_id, std::uint64_t reference_id) {
+    FramePose pose;
+    pose.header().frame_id(frame_id);
+    pose.reference_keyframe_id(reference_id);
+    fake_.send("frame_pose", pose);
+  }
+
   void send_keyframe(std::uint64_t id, std::uint64_t frame_id) {
     fake_.send<Keyframe>("keyframe", [&](Keyframe& keyframe) {
       keyframe.id(id);
@@ -93,7 +101,6 @@ TEST_F(DenseMapTest, StreamsThePointsOfKeyframesOnly) {
   send_images(1);
   send_images(2);
   send_keyframe(1, 2);
-  EXPECT_EQ(fake_.published<Progress>("progress").size(), 1U);
   fake_.advance(std::chrono::seconds(2));
   const auto points = published_points();
   ASSERT_GT(points.size(), 500U);
@@ -106,11 +113,18 @@ TEST_F(DenseMapTest, StreamsThePointsOfKeyframesOnly) {
   component.stop();
 }
 
-TEST_F(DenseMapTest, AKeyframeMayComeBeforeItsImages) {
+TEST_F(DenseMapTest, AFrameIsDoneWhenItsPointsAreInWhateverComesFirst) {
   DenseMapComponent component(fake_);
+  const auto done = [&] { return fake_.published<Progress>("progress").size(); };
+  send_pose(7, 1);
+  EXPECT_EQ(done(), 0U) << "its keyframe is announced";
   send_keyframe(1, 7);
+  EXPECT_EQ(done(), 0U) << "its images are missing";
   send_images(7);
-  EXPECT_EQ(fake_.published<Progress>("progress").size(), 1U);
+  EXPECT_EQ(done(), 1U);
+  send_images(8);
+  send_pose(8, 1);
+  EXPECT_EQ(done(), 2U) << "no keyframe";
   component.stop();
 }
 
@@ -162,7 +176,7 @@ TEST_F(DenseMapTest, OldImagesAreLetGo) {
   for (std::uint64_t frame = 1; frame <= 20; ++frame) send_images(frame);
   EXPECT_EQ(fake_.subscription_stats("frame_image").starved, 0U);
   for (std::uint64_t id = 1; id <= 10; ++id) send_keyframe(id, id);
-  EXPECT_EQ(fake_.diagnostics().status().values["keyframes without images"], "6");
+  EXPECT_EQ(fake_.diagnostics().status().values["keyframes without images"], "2");
   component.stop();
 }
 

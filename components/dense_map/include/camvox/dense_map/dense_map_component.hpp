@@ -41,8 +41,14 @@ class DenseMapComponent final : public Component {
   using FrameImage = camvox_interfaces::msg::FrameImage;
   using DepthImage = camvox_interfaces::msg::DepthImage;
   using Keyframe = camvox_interfaces::msg::Keyframe;
+  using FramePose = camvox_interfaces::msg::FramePose;
   using MapUpdate = camvox_interfaces::msg::MapUpdate;
 
+  /// A tracked frame that was not yet reported done.
+  struct OpenFrame {
+    camvox_interfaces::msg::MessageHeader header;
+    std::uint64_t reference_id = 0;
+  };
   struct PendingKeyframe {
     std::uint64_t id = 0;
     geometry::SE3 T_map_camera;
@@ -51,8 +57,10 @@ class DenseMapComponent final : public Component {
   template <typename Message>
   void keep(std::map<std::uint64_t, Sample<Message>>& frames, const Sample<Message>& sample);
   void on_keyframe(const Keyframe& keyframe);
+  void on_pose(const FramePose& pose);
   void on_update(const MapUpdate& update);
   void add_if_complete(std::uint64_t frame_id);
+  void report_done();
   void publish();
 
   Context& context_;
@@ -64,6 +72,8 @@ class DenseMapComponent final : public Component {
   std::map<std::uint64_t, Sample<FrameImage>> images_;
   std::map<std::uint64_t, Sample<DepthImage>> depths_;
   std::map<std::uint64_t, PendingKeyframe> pending_;
+  std::deque<OpenFrame> open_;
+  std::uint64_t newest_keyframe_ = 0;
   std::uint64_t missed_ = 0;
 };
 

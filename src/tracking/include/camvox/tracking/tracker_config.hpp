@@ -13,7 +13,7 @@ namespace camvox::tracking {
 struct TrackerConfig {
   std::string depth_model = "metric";  ///< Or virtual_stereo: the paper's, for comparison.
   double virtual_baseline_m = 0.05;    ///< Of virtual_stereo.
-  double sigma_px = 1.0;               ///< Of a feature of octave 0; grows with the octave's scale.
+  double sigma_px = 0.7;               ///< Of a feature of octave 0; grows with the octave's scale.
   double close_depth_m = 130.0;        ///< Depth beyond founds no landmark.
   double max_depth_sigma_ratio = 0.1;  ///< Depth less certain than this share is not used.
   int min_features_with_depth = 100;   ///< The first keyframe needs so many.
