@@ -117,6 +117,8 @@ void MappingComponent::answer_ready() {
     if (keyframe != keyframes_.end()) {
       insert(keyframe->second);
       keyframes_.erase(keyframes_.begin(), std::next(keyframe));
+      // Loop closing looks at the keyframe as the map has it now.
+      if (config_.lockstep) publish_update(frame.header);
     }
     const bool loop_open = config_.lockstep && config_.wait_for_loop_closing &&
                            frame.header.frame_id() == newest_keyframe_frame_ &&
@@ -129,7 +131,6 @@ void MappingComponent::answer_ready() {
 
 void MappingComponent::insert(const tracking::Keyframe& keyframe) {
   newest_keyframe_ = std::max(newest_keyframe_, keyframe.id);
-  newest_keyframe_frame_ = keyframe.frame_id;
   mapper_.set_reference(keyframe.id);
   const auto inserted = mapper_.insert(keyframe);
   if (!inserted.inserted) {
@@ -137,6 +138,7 @@ void MappingComponent::insert(const tracking::Keyframe& keyframe) {
     context_.diagnostics().set("keyframes refused", ++refused_);
     return;
   }
+  newest_keyframe_frame_ = keyframe.frame_id;
   if (config_.lockstep) {
     adjust(mapper_.local_job(keyframe.id));
     mapper_.cull_keyframes(keyframe.id);
