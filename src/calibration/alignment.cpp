@@ -1,0 +1,264 @@
+#include "alignment.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+namespace camvox::calibration {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+using geometry::SE3;
+
+constexpr float kOutlierShare = 0.3F;
+constexpr int kMaxSteps = 12;
+constexpr std::size_t kSearchEdges = 1200;  ///< Enough for the grid, all scenes together.
+
+bool selected(const PreparedScene& scene, std::size_t edge, Part part) {
+  return part == Part::kAll || scene.parts[edge] == part;
+}
+
+float gain_over_chance(float density) {
+  return std::log(kOutlierShare + (1.0F - kOutlierShare) * density);
+}
+
+/// A lidar edge in the image.
+struct ProjectedEdge {
+  Vector2d u_px;
+  Vector2d normal;
+  Eigen::Matrix<double, 1, 6> J;  ///< Of the position across the edge, for a right perturbation.
+};
+
+std::optional<ProjectedEdge> project(const sensors::CameraModel& camera,
+                                     const SE3& T_camera_lidar,
+                                     const Eigen::Matrix3d& R_camera_lidar,
+                                     const LidarEdge& edge) {
+  const Vector3d p_camera = R_camera_lidar * edge.p_lidar + T_camera_lidar.translation();
+  const auto projection = camera.project_with_jacobian(p_camera);
+  if (!projection || !camera.contains(projection->u_px, 2.0)) return std::nullopt;
+  const Vector2d tangent = projection->J_point * (R_camera_lidar * edge.tangent_lidar);
+  const double length = tangent.norm();
+  if (!(length > 1e-9)) return std::nullopt;
+  const Vector2d normal(-tangent.y() / length, tangent.x() / length);
+  const Eigen::RowVector3d J_point = normal.transpose() * projection->J_point * R_camera_lidar;
+  ProjectedEdge projected{projection->u_px, normal, {}};
+  projected.J.leftCols<3>() = -J_point * geometry::skew(edge.p_lidar);
+  projected.J.rightCols<3>() = J_point;
+  return projected;
+}
+
+/// The mean position of contrast across an edge, weighted by a window; and how far it stands out.
+struct Match {
+  double offset_px = 0.0;
+  double quality = 0.0;
+};
+
+Match match_contrast(const ImageEdges& image, const ProjectedEdge& edge, double reach_px) {
+  // Two sigmas of the window on each side, in steps of a pixel or of a fifth of the window.
+  const double step = std::max(1.0, reach_px / 3.0);
+  const int steps = static_cast<int>(std::ceil(2.0 * reach_px / step));
+  double sum = 0.0;
+  double moment = 0.0;
+  double window_sum = 0.0;
+  for (int k = -steps; k <= steps; ++k) {
+    const double offset = k * step;
+    const auto contrast =
+        static_cast<double>(image.contrast(edge.u_px + offset * edge.normal, edge.normal));
+    const double window = std::exp(-0.5 * offset * offset / (reach_px * reach_px));
+    const double weight = window * contrast * contrast;
+    sum += weight;
+    moment += weight * offset;
+    window_sum += window;
+  }
+  if (!(sum > 0.0)) return {};
+  const double mean = sum / window_sum;
+  return {moment / sum, mean / (mean + 0.05)};
+}
+
+}  // namespace
+
+double Alignment::score(const SE3& T_camera_lidar, std::size_t level, Part part) const {
+  return climb_equations(T_camera_lidar, level, part).score;
+}
+
+NormalEquations Alignment::climb_equations(const SE3& T_camera_lidar,
+                                           std::size_t level,
+                                           Part part) const {
+  const Eigen::Matrix3d R = T_camera_lidar.rotation().matrix();
+  NormalEquations equations;
+  for (const PreparedScene& scene : scenes_) {
+    const EdgeField& field = scene.fields[level];
+    const double sigma2 = field.sigma_px() * field.sigma_px();
+    for (std::size_t i = 0; i < scene.lidar.edges.size(); ++i) {
+      if (!selected(scene, i, part)) continue;
+      const LidarEdge& lidar_edge = scene.lidar.edges[i];
+      const auto weight = static_cast<double>(lidar_edge.strength);
+      equations.weight += weight;
+      const auto edge = project(camera_, T_camera_lidar, R, lidar_edge);
+      if (!edge) {
+        equations.score += weight * static_cast<double>(gain_over_chance(0.0F));
+        continue;
+      }
+      const FieldSample sample = field.sample(edge->u_px, edge->normal);
+      equations.score += weight * static_cast<double>(gain_over_chance(sample.density));
+      if (!(sample.density > 1e-6F)) continue;
+      const double hit = (1.0F - kOutlierShare) * sample.density;
+      const double w = weight * hit / (static_cast<double>(kOutlierShare) + hit);
+      const double slope = sample.slope_px.cast<double>().dot(edge->normal);
+      const double offset = sigma2 * slope / static_cast<double>(sample.density);
+      equations.H += w * edge->J.transpose() * edge->J;
+      equations.b += w * offset * edge->J.transpose();
+      equations.inlier_weight += w;
+      equations.squared_error_px2 += w * offset * offset;
+    }
+  }
+  if (equations.weight > 0.0) equations.score /= equations.weight;
+  return equations;
+}
+
+std::vector<SE3> Alignment::search(const SE3& T_camera_lidar,
+                                   double reach_rad,
+                                   std::size_t count,
+                                   const std::stop_token& stop) const {
+  struct Point {
+    const EdgeField* field;
+    Vector3d p_camera;  ///< Without the translation.
+    Vector2d normal;
+    float weight;
+  };
+  const Eigen::Matrix3d R = T_camera_lidar.rotation().matrix();
+  std::vector<Point> points;
+  std::size_t total = 0;
+  for (const PreparedScene& scene : scenes_) total += scene.lidar.edges.size();
+  const std::size_t stride = std::max<std::size_t>(1, total / kSearchEdges);
+  for (const PreparedScene& scene : scenes_) {
+    for (std::size_t i = 0; i < scene.lidar.edges.size(); i += stride) {
+      const LidarEdge& edge = scene.lidar.edges[i];
+      const auto projected = project(camera_, T_camera_lidar, R, edge);
+      if (!projected) continue;
+      points.push_back({&scene.fields.front(), R * edge.p_lidar, projected->normal, edge.strength});
+    }
+  }
+  // A step turns by as much as the coarsest field is wide.
+  const double step = scenes_.front().fields.front().sigma_px() / camera_.intrinsics().fx_px;
+  const int steps = static_cast<int>(std::ceil(reach_rad / step));
+  struct Candidate {
+    double score;
+    Vector3d turn;
+  };
+  std::vector<Candidate> candidates;
+  for (int x = -steps; x <= steps && !stop.stop_requested(); ++x) {
+    for (int y = -steps; y <= steps; ++y) {
+      for (int z = -steps; z <= steps; ++z) {
+        const Vector3d turn = step * Vector3d(x, y, z);
+        if (turn.norm() > reach_rad + 0.5 * step) continue;
+        const Eigen::Matrix3d R_turn = geometry::SO3::exp(turn).matrix();
+        double score = 0.0;
+        for (const Point& point : points) {
+          const auto u_px = camera_.project(R_turn * point.p_camera + T_camera_lidar.translation());
+          const float density = u_px ? point.field->density(*u_px, point.normal) : 0.0F;
+          score += static_cast<double>(point.weight * gain_over_chance(density));
+        }
+        candidates.push_back({score, turn});
+      }
+    }
+  }
+  std::stable_sort(candidates.begin(), candidates.end(), [](const auto& a, const auto& b) {
+    return a.score > b.score;
+  });
+  std::vector<Vector3d> chosen;
+  std::vector<SE3> poses;
+  for (const Candidate& candidate : candidates) {
+    const bool near = std::any_of(chosen.begin(), chosen.end(), [&](const Vector3d& other) {
+      return (other - candidate.turn).norm() < 1.5 * step;
+    });
+    if (near) continue;
+    chosen.push_back(candidate.turn);
+    poses.emplace_back(geometry::SO3::exp(candidate.turn) * T_camera_lidar.rotation(),
+                       T_camera_lidar.translation());
+    if (poses.size() == count) break;
+  }
+  return poses;
+}
+
+SE3 Alignment::climb(const SE3& T_camera_lidar,
+                     std::size_t level,
+                     const TranslationPrior& prior,
+                     Part part) const {
+  SE3 T = T_camera_lidar;
+  const double sigma_px = scenes_.front().fields[level].sigma_px();
+  for (int i = 0; i < kMaxSteps; ++i) {
+    const NormalEquations equations = climb_equations(T, level, part);
+    if (!(equations.inlier_weight > 0.0)) break;
+    const geometry::Vector6d step = solve_step(equations, T, prior, sigma_px);
+    T = geometry::retract(T, step);
+    if (step.head<3>().norm() * camera_.intrinsics().fx_px < 0.02 * sigma_px) break;
+  }
+  return T;
+}
+
+NormalEquations Alignment::linearise(const SE3& T_camera_lidar, double reach_px, Part part) const {
+  const Eigen::Matrix3d R = T_camera_lidar.rotation().matrix();
+  NormalEquations equations;
+  for (const PreparedScene& scene : scenes_) {
+    for (std::size_t i = 0; i < scene.lidar.edges.size(); ++i) {
+      if (!selected(scene, i, part)) continue;
+      const LidarEdge& lidar_edge = scene.lidar.edges[i];
+      const auto edge = project(camera_, T_camera_lidar, R, lidar_edge);
+      if (!edge) continue;
+      const auto weight = static_cast<double>(lidar_edge.strength);
+      const Match match = match_contrast(scene.image, *edge, reach_px);
+      const double w = weight * match.quality;
+      equations.weight += weight;
+      equations.H += w * edge->J.transpose() * edge->J;
+      equations.b += w * match.offset_px * edge->J.transpose();
+      equations.inlier_weight += w;
+      equations.squared_error_px2 += w * match.offset_px * match.offset_px;
+    }
+  }
+  return equations;
+}
+
+SE3 Alignment::refine(const SE3& T_camera_lidar,
+                      double reach_px,
+                      const TranslationPrior& prior,
+                      Part part) const {
+  SE3 T = T_camera_lidar;
+  for (int i = 0; i < 2 * kMaxSteps; ++i) {
+    const NormalEquations equations = linearise(T, reach_px, part);
+    if (!(equations.inlier_weight > 0.0)) break;
+    const geometry::Vector6d step = solve_step(equations, T, prior, reach_px);
+    T = geometry::retract(T, step);
+    if (step.head<3>().norm() < 1e-6 && step.tail<3>().norm() < 1e-5) break;
+  }
+  return T;
+}
+
+geometry::Matrix6d information(const NormalEquations& equations, double sigma_px) {
+  return equations.H * (kIndependentShare / (sigma_px * sigma_px));
+}
+
+geometry::Matrix6d prior_information(const TranslationPrior& prior) {
+  geometry::Matrix6d result = geometry::Matrix6d::Zero();
+  result.bottomRightCorner<3, 3>() = Eigen::Matrix3d::Identity() / (prior.sigma_m * prior.sigma_m);
+  return result;
+}
+
+geometry::Vector6d solve_step(const NormalEquations& equations,
+                              const SE3& T_camera_lidar,
+                              const TranslationPrior& prior,
+                              double sigma_px) {
+  geometry::Matrix6d H = information(equations, sigma_px);
+  geometry::Vector6d b = equations.b * (kIndependentShare / (sigma_px * sigma_px));
+  H += prior_information(prior);
+  b.tail<3>() += T_camera_lidar.rotation().inverse() *
+                 (prior.t_camera_lidar - T_camera_lidar.translation()) /
+                 (prior.sigma_m * prior.sigma_m);
+  H.diagonal().array() += 1e-9 * H.diagonal().maxCoeff();
+  return H.ldlt().solve(b);
+}
+
+}  // namespace camvox::calibration

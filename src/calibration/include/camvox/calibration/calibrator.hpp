@@ -1,0 +1,119 @@
+#pragma once
+
+#include <stop_token>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "camvox/calibration/camvox_method.hpp"
+#include "camvox/calibration/lidar_edges.hpp"
+#include "camvox/calibration/scene.hpp"
+#include "camvox/config/parameters.hpp"
+#include "camvox/geometry/se3.hpp"
+#include "camvox/sensors/camera_intrinsics.hpp"
+
+namespace camvox::calibration {
+
+/// When a result replaces the extrinsics in force. YAML keys are the field names.
+struct GateConfig {
+  double max_disagreement_deg = 0.2;  ///< Between the result and those of independent halves.
+  double min_score = 0.3;             ///< Gain over chance, nats per edge; a wrong fit has less.
+  double min_inlier_share = 0.5;      ///< Of the lidar's edges that found an image edge.
+  double max_sigma_deg = 0.1;         ///< Of the worst-known axis of rotation.
+
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& field) {
+    field("max_disagreement_deg", self.max_disagreement_deg, config::greater_than(0.0));
+    field("min_score", self.min_score, config::at_least(-10.0));
+    field("min_inlier_share", self.min_inlier_share, config::at_least(0.0), config::at_most(1.0));
+    field("max_sigma_deg", self.max_sigma_deg, config::greater_than(0.0));
+  }
+};
+
+/// Tuning of calibrate. YAML keys are the field names.
+struct CalibrationConfig {
+  std::string method = "edges";      ///< edges: ours, 6 DoF; camvox: the paper's, rotation only.
+  double max_rotation_deg = 6.0;     ///< How far the first guess may be off.
+  double translation_sigma_m = 0.1;  ///< How well its translation is known, per axis.
+  LidarEdgeConfig lidar_edges;
+  GateConfig gate;
+  CamvoxMethodConfig camvox;
+
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& field) {
+    field("method", self.method, config::one_of({"edges", "camvox"}));
+    field("max_rotation_deg",
+          self.max_rotation_deg,
+          config::greater_than(0.0),
+          config::at_most(20.0));
+    field("translation_sigma_m",
+          self.translation_sigma_m,
+          config::greater_than(0.0),
+          config::at_most(10.0));
+    field("lidar_edges", self.lidar_edges);
+    field("gate", self.gate);
+    field("camvox", self.camvox);
+  }
+};
+
+/// How a calibration ended. Only kDone comes with numbers.
+enum class CalibrationStatus {
+  kDone,  ///< There is a result; `accepted` tells whether it passed the gate.
+  kCancelled,
+  kNoScene,
+  kWrongImageSize,  ///< The image is not of the size that the intrinsics are for.
+  kBlankImage,      ///< No contrast: covered lens, night.
+  kNoImageEdges,
+  kEmptyCloud,   ///< Too few returns in the camera's view.
+  kNoLidarEdges  ///< A scene without structure: a wall.
+};
+[[nodiscard]] std::string_view to_string(CalibrationStatus status);
+
+/// A result and all that is needed to judge it.
+struct CalibrationResult {
+  CalibrationStatus status = CalibrationStatus::kNoScene;
+  bool accepted = false;  ///< Passed the gate.
+  std::string reason;     ///< Why not, for people; empty when accepted.
+  geometry::SE3 T_camera_lidar;
+  /// Of a right perturbation (axes of the lidar), [rotation; translation].
+  geometry::Matrix6d covariance_lidar = geometry::Matrix6d::Zero();
+  double score_before = 0.0;  ///< Gain over chance, nats per edge: higher is better.
+  double score_after = 0.0;
+  double held_back_before = 0.0;  ///< The same, on the half that a fit did not see.
+  double held_back_after = 0.0;
+  double nid_before = 1.0;  ///< Normalised information distance, 0 to 1: lower is better.
+  double nid_after = 1.0;
+  double camvox_cost_before = 0.0;  ///< The paper's cost, px; of the first scene.
+  double camvox_cost_after = 0.0;
+  double inlier_share = 0.0;
+  double disagreement_deg = 0.0;     ///< Largest, between the result and the fits of both halves.
+  double sigma_rotation_deg = 0.0;   ///< Of the worst-known axis.
+  double sigma_translation_m = 0.0;  ///< Of the worst-known axis.
+  int observable_translations = 0;   ///< Axes that the scenes give to 2 cm, 0 to 3.
+  std::size_t lidar_edges = 0;
+};
+
+/// Finds the extrinsics of camera and lidar from natural scenes; one image and some seconds of a
+/// non-repeating lidar are enough.
+///
+/// `edges`: edges of reflectivity and depth (see extract_lidar_edges) are fitted to the image's in
+/// four levels from 0.8 degrees to a pixel. A grid over rotations finds where to start, expectation
+/// maximisation climbs the levels in 6 DoF, the translation held by its prior where the scenes do
+/// not determine it. Ideas: Levinson & Thrun, "Automatic online calibration of cameras and
+/// lasers", RSS 2013 (edges); Yuan et al., RA-L 2021 (edges in 3D); Koide et al., ICRA 2023 (NID).
+/// `camvox`: see camvox_method.hpp.
+///
+/// The verdict is the same for both methods: a fit to each half of the view (a chessboard of
+/// tiles) is judged on the other half, against the old extrinsics. Deterministic, without threads;
+/// `stop` ends it within some tens of milliseconds. Throws config::ConfigError for bad intrinsics
+/// or config.
+[[nodiscard]] CalibrationResult calibrate(const std::vector<Scene>& scenes,
+                                          const sensors::CameraIntrinsics& intrinsics,
+                                          const geometry::SE3& T_camera_lidar_guess,
+                                          const CalibrationConfig& config = {},
+                                          const std::stop_token& stop = {});
+
+/// The result in lines for people.
+[[nodiscard]] std::string report_text(const CalibrationResult& result);
+
+}  // namespace camvox::calibration
