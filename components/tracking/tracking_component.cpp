@@ -10,7 +10,6 @@ namespace camvox {
 namespace {
 
 namespace msg = camvox_interfaces::msg;
-using tracking::TrackingState;
 
 /// Rotation from this camera frame to the one before, from what the gyro says in the IMU's axes.
 std::optional<geometry::SO3> camera_rotation(const std::array<double, 4>& rotation_imu,
@@ -49,8 +48,12 @@ TrackingComponent::TrackingComponent(Context& context)
   context.subscribe<msg::DepthImage>(
       {"depth_image", topics::kDepthImage}, collect, {.qos = qos::kFrames, .max_held = kHeld});
   if (config_.use_imu) {
-    context.subscribe<msg::Cloud>(
-        {"cloud", topics::kCloud}, collect, {.qos = qos::kFrames, .max_held = kHeld});
+    context.subscribe<msg::Cloud>({"cloud", topics::kCloud},
+                                  [this, collect](const auto& cloud) {
+                                    remember_rotation(*cloud);
+                                    collect(cloud);
+                                  },
+                                  {.qos = qos::kFrames, .max_held = kHeld});
   }
   context.subscribe<msg::LocalMap>(
       {"local_map", topics::kLocalMap},
@@ -72,24 +75,33 @@ void TrackingComponent::on_map(const LocalMap& map) {
 }
 
 void TrackingComponent::on_answer(const Answer& answer) {
+  const auto work = progress_.measure();
   const auto frame_id = answer.header().frame_id();
+  if (frame_id == awaited_answer_) awaited_answer_ = 0;
   if (answer.found() == 0 || answer.keyframe_ids_count() == 0) {
     tracker_.relocalisation_failed(frame_id);
-    return;
+  } else {
+    tracker_.relocalise({frame_id,
+                         answer.map_epoch(),
+                         answer.keyframe_ids()[0],
+                         conversion::to_se3(answer.T_map_camera())});
   }
-  tracker_.relocalise({frame_id,
-                       answer.map_epoch(),
-                       answer.keyframe_ids()[0],
-                       conversion::to_se3(answer.T_map_camera())});
+  process_ready();
+}
+
+void TrackingComponent::remember_rotation(const msg::Cloud& cloud) {
+  const auto R_previous_camera = camera_rotation(cloud.rotation_imu(), R_camera_imu_);
+  if (R_previous_camera) rotations_.add(cloud.header().frame_id(), *R_previous_camera);
 }
 
 void TrackingComponent::process_ready() {
-  for (auto id = queue_.next(); id && may_process(*id); id = queue_.next()) {
+  for (auto id = queue_.next(); id && may_process(); id = queue_.next()) {
     process(queue_.take(*id));
   }
 }
 
-bool TrackingComponent::may_process(std::uint64_t) const {
+bool TrackingComponent::may_process() const {
+  if (awaited_answer_ != 0) return false;
   const bool waits = config_.lockstep && config_.wait_for_map && last_frame_id_ != 0;
   return !waits || map_frame_id_ >= last_frame_id_;
 }
@@ -97,8 +109,8 @@ bool TrackingComponent::may_process(std::uint64_t) const {
 void TrackingComponent::process(const FrameInputs& inputs) {
   const double started_s = thread_processor_time_s();
   const auto header = (*inputs.image)->header();
-  last_frame_id_ = header.frame_id();
   auto result = tracker_.track(make_frame(inputs));
+  last_frame_id_ = header.frame_id();
   publish(result, thread_processor_time_s() - started_s);
   report(result);
   progress_.done(header);
@@ -128,15 +140,16 @@ tracking::Frame TrackingComponent::make_frame(const FrameInputs& inputs) {
                                    grey->height_px,
                                    static_cast<std::ptrdiff_t>(grey->row_step_bytes)},
                                   depth);
-  if (inputs.cloud) {
-    frame.R_previous_camera = camera_rotation((*inputs.cloud)->rotation_imu(), R_camera_imu_);
-  }
+  frame.R_previous_camera = rotations_.between(last_frame_id_, frame.frame_id);
   return frame;
 }
 
 void TrackingComponent::publish(tracking::FrameResult& result, double time_s) {
   if (result.keyframe) publish_keyframe(*result.keyframe, keyframes_);
-  if (result.relocalisation_request) publish_keyframe(*result.relocalisation_request, requests_);
+  if (result.relocalisation_request) {
+    publish_keyframe(*result.relocalisation_request, requests_);
+    if (config_.lockstep && requests_.subscriber_count() > 0) awaited_answer_ = result.frame_id;
+  }
   if (result.keyframe) ++keyframes_sent_;
   auto pose = poses_.loan();
   conversion::write_frame_pose(result, *pose);
@@ -157,6 +170,7 @@ void TrackingComponent::publish_keyframe(const tracking::Keyframe& keyframe,
 }
 
 void TrackingComponent::report(const tracking::FrameResult& result) {
+  constexpr std::array kLevels = {HealthLevel::kOk, HealthLevel::kWarn, HealthLevel::kError};
   constexpr std::array kNames = {"waiting", "ok", "lost", "relocalising", "localisation only"};
   auto& diagnostics = context_.diagnostics();
   const auto& statistics = result.statistics;
@@ -171,15 +185,11 @@ void TrackingComponent::report(const tracking::FrameResult& result) {
   diagnostics.set("chi2 per row", statistics.chi2_per_row);
   diagnostics.set("keyframes", keyframes_sent_);
   diagnostics.set("dropped frames", queue_.dropped());
-  if (result.state == TrackingState::kLost || result.state == TrackingState::kRelocalising) {
-    diagnostics.report(HealthLevel::kError, "lost");
-  } else if (result.has_pose() && statistics.inliers * 3 < statistics.matches) {
-    diagnostics.report(HealthLevel::kWarn,
-                       "few matches agree with the pose: is the calibration "
-                       "right?");
-  } else {
-    diagnostics.report(HealthLevel::kOk, "ok");
-  }
+  diagnostics.set("landmarks", static_cast<std::uint64_t>(tracker_.map().landmarks().size()));
+  count("banned landmarks", statistics.banned_landmarks);
+  health_.add(result);
+  const auto& health = health_.status();
+  diagnostics.report(kLevels.at(static_cast<std::size_t>(health.level)), health.message);
 }
 
 }  // namespace camvox

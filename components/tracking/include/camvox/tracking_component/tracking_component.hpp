@@ -11,9 +11,11 @@
 #include "camvox/interfaces/tf2_msgs.hpp"
 #include "camvox/sensors/rig.hpp"
 #include "camvox/tracking/frame_builder.hpp"
+#include "camvox/tracking/health.hpp"
 #include "camvox/tracking/tracker.hpp"
 #include "camvox/tracking_component/frame_queue.hpp"
 #include "camvox/tracking_component/odometry_output.hpp"
+#include "camvox/tracking_component/rotation_history.hpp"
 
 namespace camvox {
 
@@ -41,8 +43,10 @@ struct TrackingComponentConfig {
 };
 
 /// Follows the camera: the pose of every frame, keyframes, odometry and transforms (see
-/// tracking::Tracker). Live, the newest complete frame counts and what it overtakes is dropped and
-/// counted; a frame whose depth does not come is tracked without when the next one is complete.
+/// tracking::Tracker). The keyframe of a frame is published before its pose. Live, the newest
+/// complete frame counts and what it overtakes is dropped and counted; a frame whose depth does not
+/// come is tracked without when the next one is complete. In lockstep a frame also waits for the
+/// answer to the relocalisation request of the one before, if anybody listens to requests.
 class TrackingComponent final : public Component {
  public:
   explicit TrackingComponent(Context& context);
@@ -54,8 +58,9 @@ class TrackingComponent final : public Component {
 
   void on_map(const LocalMap& map);
   void on_answer(const Answer& answer);
+  void remember_rotation(const camvox_interfaces::msg::Cloud& cloud);
   void process_ready();
-  [[nodiscard]] bool may_process(std::uint64_t frame_id) const;
+  [[nodiscard]] bool may_process() const;
   void process(const FrameInputs& inputs);
   [[nodiscard]] tracking::Frame make_frame(const FrameInputs& inputs);
   void publish(tracking::FrameResult& result, double time_s);
@@ -69,14 +74,17 @@ class TrackingComponent final : public Component {
   geometry::SO3 R_camera_imu_;
   tracking::FrameBuilder builder_;
   tracking::Tracker tracker_;
+  tracking::HealthMonitor health_;
   tracking_component::FrameQueue queue_;
+  tracking_component::RotationHistory rotations_;
   tracking_component::OdometryOutput odometry_;
   ProgressReporter progress_;
   Publisher<camvox_interfaces::msg::FramePose> poses_;
   Publisher<camvox_interfaces::msg::Keyframe> keyframes_;
   Publisher<camvox_interfaces::msg::Keyframe> requests_;
   std::uint64_t last_frame_id_ = 0;
-  std::uint64_t map_frame_id_ = 0;  ///< Of the newest local map.
+  std::uint64_t map_frame_id_ = 0;    ///< Of the newest local map.
+  std::uint64_t awaited_answer_ = 0;  ///< In lockstep: to the request of this frame; 0: none.
   std::uint64_t keyframes_sent_ = 0;
 };
 
