@@ -1,0 +1,86 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "camvox/calibration_component/calibration_job.hpp"
+#include "camvox/component/component.hpp"
+#include "camvox/interfaces/camvox_interfaces.hpp"
+#include "camvox/interfaces/std_msgs.hpp"
+#include "camvox/sensors/rig.hpp"
+
+namespace camvox {
+
+/// Parameters of CalibrationComponent. YAML keys are the field names.
+struct CalibrationComponentConfig {
+  bool automatic = true;         ///< Calibrate at each new standstill.
+  std::int64_t request = 0;      ///< Set to another number to calibrate at the next standstill.
+  double collect_s = 4.0;        ///< Time for which scans are accumulated.
+  double min_interval_s = 60.0;  ///< Between automatic calibrations.
+  std::string rig_file;          ///< Written when a result is accepted; empty: none.
+  std::string overlay_folder;    ///< For pictures before.png and after.png; empty: none.
+  calibration::CalibrationConfig calibration;
+  sensors::CameraIntrinsics camera;
+  sensors::RigConfig rig;
+
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& field) {
+    field("automatic", self.automatic);
+    field("request", self.request);
+    field("collect_s", self.collect_s, config::greater_than(0.0), config::at_most(30.0));
+    field("min_interval_s", self.min_interval_s, config::at_least(0.0));
+    field("rig_file", self.rig_file);
+    field("overlay_folder", self.overlay_folder);
+    field("calibration", self.calibration);
+    field("camera", self.camera);
+    field("rig", self.rig);
+  }
+};
+
+/// Calibrates lidar and camera while the robot stands still: keeps one image and the returns of
+/// some seconds, and computes on a thread of its own, so that nothing waits for it. Motion cancels
+/// at once. A result that passes the gate is published as the extrinsics in force (latched,
+/// versioned), any other one as a proposal (applied = 0), after which those in force are repeated.
+class CalibrationComponent final : public Component {
+ public:
+  explicit CalibrationComponent(Context& context);
+  ~CalibrationComponent() override { job_.wait(); }
+  void stop() override { job_.wait(); }
+
+ private:
+  using Cloud = camvox_interfaces::msg::Cloud;
+  using FrameImage = camvox_interfaces::msg::FrameImage;
+  using Extrinsics = camvox_interfaces::msg::Extrinsics;
+
+  void on_image(const FrameImage& image);
+  void on_cloud(const Cloud& cloud);
+  void on_motion();
+  [[nodiscard]] bool wanted(std::int64_t stamp_ns) const;
+  void start_job(const camvox_interfaces::msg::MessageHeader& header);
+  void finish(std::uint64_t run, const calibration::CalibrationResult& result);
+  void publish(const calibration::CalibrationResult& result);
+  void save_rig();
+
+  Context& context_;
+  CalibrationComponentConfig config_;
+  sensors::RigCalibration rig_;
+  geometry::SE3 T_camera_lidar_;
+  std::uint64_t version_ = 0;
+  Publisher<Extrinsics> extrinsics_;
+  std::optional<Extrinsics> in_force_;
+  bool requested_ = false;
+  bool done_here_ = false;  ///< This standstill has had its calibration.
+  bool standing_ = false;
+  std::optional<std::int64_t> first_ns_;
+  std::optional<std::int64_t> last_run_ns_;
+  calibration::Scene scene_;
+  camvox_interfaces::msg::MessageHeader header_;
+  std::uint64_t run_ = 0;  ///< Raised by each start and each cancellation.
+  std::uint64_t accepted_ = 0;
+  std::uint64_t refused_ = 0;
+  std::uint64_t cancelled_ = 0;
+  calibration_component::CalibrationJob job_;
+};
+
+}  // namespace camvox

@@ -1,0 +1,3 @@
+#include "camvox/calibration_component/calibration_component.hpp"
+
+CAMVOX_REGISTER_COMPONENT(camvox::CalibrationComponent)

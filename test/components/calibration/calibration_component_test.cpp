@@ -1,0 +1,140 @@
+#include "camvox/calibration_component/calibration_component.hpp"
+
+#include <gmock/gmock.h>
+#include <unistd.h>
+
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <numbers>
+
+#include "camvox/component/fake_context.hpp"
+#include "camvox/conversion/pose.hpp"
+#include "simulated_stop.hpp"
+
+namespace camvox {
+namespace {
+
+using camvox_interfaces::msg::Cloud;
+using camvox_interfaces::msg::Extrinsics;
+using camvox_interfaces::msg::FrameImage;
+using ::testing::HasSubstr;
+namespace fs = std::filesystem;
+
+constexpr std::int64_t kSecond_ns = 1'000'000'000;
+
+const calibration::Scene& corridor() {
+  static const calibration::Scene scene = test::look_from({"corridor", 1, 6.0, 0.0, 0.0}, 1);
+  return scene;
+}
+
+/// The component with a recorded rig that is off by a degree and a half.
+class CalibrationComponentTest : public ::testing::Test {
+ protected:
+  CalibrationComponentTest() {
+    const geometry::SE3 T_lidar_camera =
+        test::true_T_camera_lidar().inverse() *
+        geometry::SE3::exp((geometry::Vector6d() << 0.02, -0.015, 0.01, 0, 0, 0).finished());
+    const auto& t = T_lidar_camera.translation();
+    const auto& q = T_lidar_camera.rotation().quaternion();
+    fake_.set_parameter("rig.T_lidar_camera.translation_m",
+                        std::vector<double>{t.x(), t.y(), t.z()});
+    fake_.set_parameter("rig.T_lidar_camera.rotation_xyzw",
+                        std::vector<double>{q.x(), q.y(), q.z(), q.w()});
+    fake_.set_parameter("collect_s", 1.0);
+    folder_ = fs::temp_directory_path() / ("camvox_calibration_" + std::to_string(getpid()));
+    fs::create_directories(folder_);
+    fake_.set_parameter("rig_file", (folder_ / "rig.yaml").string());
+    fake_.set_parameter("overlay_folder", (folder_ / "pictures").string());
+  }
+  ~CalibrationComponentTest() override { fs::remove_all(folder_); }
+
+  void send_cloud(std::int64_t stamp_ns, bool stationary, bool with_points) {
+    fake_.send<Cloud>("cloud", [&](Cloud& cloud) {
+      cloud.header().stamp_ns(stamp_ns);
+      cloud.stationary(stationary ? 1 : 0);
+      const auto& points = corridor().points_lidar;
+      const std::size_t count = with_points ? points.size() : 0;
+      for (std::size_t i = 0; i < count; ++i) {
+        std::memcpy(cloud.points()[i].data(), points[i].data(), sizeof(float) * 4);
+      }
+      cloud.points_count(static_cast<std::uint32_t>(count));
+    });
+  }
+  void send_image(std::int64_t stamp_ns) {
+    fake_.send<FrameImage>("frame_image", [&](FrameImage& message) {
+      const cv::Mat& image = corridor().image;
+      message.header().stamp_ns(stamp_ns);
+      message.width_px(static_cast<std::uint32_t>(image.cols));
+      message.height_px(static_cast<std::uint32_t>(image.rows));
+      message.row_step_bytes(static_cast<std::uint32_t>(3 * image.cols));
+      message.encoding(camvox_interfaces::msg::ENCODING_BGR8);
+      const std::size_t bytes = image.total() * 3;
+      std::memcpy(message.data().data(), image.data, bytes);
+      message.data_count(static_cast<std::uint32_t>(bytes));
+    });
+  }
+  void stand_still() {
+    send_cloud(0, true, true);
+    send_image(kSecond_ns / 2);
+    send_cloud(kSecond_ns, true, false);
+  }
+
+  FakeContext fake_{"calibration"};
+  fs::path folder_;
+};
+
+TEST_F(CalibrationComponentTest, AppliesABetterResultAtStandstill) {
+  CalibrationComponent component(fake_);
+  stand_still();
+  ASSERT_EQ(fake_.run_posted(std::chrono::minutes(2)), 1U);
+  const auto published = fake_.published<Extrinsics>("extrinsics");
+  ASSERT_EQ(published.size(), 1U);
+  EXPECT_EQ(published[0]->applied(), 1);
+  EXPECT_EQ(published[0]->version(), 1U);
+  EXPECT_LT(published[0]->cost_after(), published[0]->cost_before());
+  const auto T = conversion::to_se3(published[0]->T_camera_lidar());
+  const double error_rad =
+      (T.rotation().inverse() * test::true_T_camera_lidar().rotation()).angle_rad();
+  EXPECT_LT(error_rad * 180.0 / std::numbers::pi, 0.1);
+
+  std::ifstream rig(folder_ / "rig.yaml");
+  const std::string text{std::istreambuf_iterator<char>(rig), {}};
+  EXPECT_THAT(text, HasSubstr("camera:\n"));
+  EXPECT_THAT(text, HasSubstr("rig:\n"));
+  EXPECT_THAT(text, HasSubstr("  T_lidar_camera:\n    rotation_xyzw: ["));
+  EXPECT_TRUE(fs::exists(folder_ / "pictures" / "before.png"));
+  EXPECT_TRUE(fs::exists(folder_ / "pictures" / "after.png"));
+
+  stand_still();  // the same standstill: nothing more to do
+  EXPECT_EQ(fake_.run_posted(), 0U);
+}
+
+TEST_F(CalibrationComponentTest, MotionCancels) {
+  CalibrationComponent component(fake_);
+  stand_still();
+  send_cloud(2 * kSecond_ns, false, false);
+  fake_.run_posted(std::chrono::seconds(20));  // the cancelled one reports, and is ignored
+  EXPECT_TRUE(fake_.published<Extrinsics>("extrinsics").empty());
+  EXPECT_THAT(fake_.diagnostics().status().message, HasSubstr("cancelled"));
+}
+
+TEST_F(CalibrationComponentTest, WaitsForStandstillAndForItsInterval) {
+  fake_.set_parameter("automatic", false);
+  CalibrationComponent component(fake_);
+  stand_still();
+  EXPECT_EQ(fake_.run_posted(), 0U);
+  EXPECT_TRUE(fake_.published<Extrinsics>("extrinsics").empty());
+}
+
+TEST_F(CalibrationComponentTest, NamesWhatIsWrong) {
+  fake_.set_parameter("camera.width_px", std::int64_t{800});
+  CalibrationComponent component(fake_);
+  stand_still();
+  ASSERT_EQ(fake_.run_posted(std::chrono::seconds(60)), 1U);
+  EXPECT_TRUE(fake_.published<Extrinsics>("extrinsics").empty());
+  EXPECT_THAT(fake_.diagnostics().status().message, HasSubstr("size"));
+}
+
+}  // namespace
+}  // namespace camvox
