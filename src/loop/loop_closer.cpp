@@ -135,6 +135,7 @@ VerificationTask::Candidate LoopCloser::candidate(const PlaceScore& score) const
 std::optional<CorrectionTask> LoopCloser::consider(KeyframeId id,
                                                    const std::vector<VerifiedPlace>& places) {
   forget_old(id);
+  paths_m_.clear();
   bool accepted = false;
   LoopMeasurement newest;
   for (const auto& measurement : plausible_measurements(id, places)) {
@@ -195,21 +196,23 @@ std::vector<LoopMeasurement> LoopCloser::plausible_measurements(
 }
 
 bool LoopCloser::agree(const LoopMeasurement& a, const LoopMeasurement& b) const {
+  constexpr double kNear_m = 60.0;  // farther apart than keyframes of a window are
   constexpr double kFar_m = 1e3;
-  const auto length = [&](KeyframeId from, KeyframeId to) {
-    if (from == to) return 0.0;
-    const double straight_m = map_.relative_pose(from, to).translation().norm();
-    const auto paths_m = map_.path_lengths(from, 10.0 + 3.0 * straight_m, loop_connections());
-    const auto found = paths_m.find(to);
-    return found == paths_m.end() ? kFar_m : found->second;
+  const auto length_m = [&](KeyframeId from, KeyframeId to) {
+    auto known = paths_m_.find(from);
+    if (known == paths_m_.end()) {
+      known = paths_m_.emplace(from, map_.path_lengths(from, kNear_m, loop_connections())).first;
+    }
+    const auto found = known->second.find(to);
+    return found == known->second.end() ? kFar_m : found->second;
   };
   LoopPair pair;
   pair.a = &a;
   pair.b = &b;
   pair.T_query_a_query_b = map_.relative_pose(a.query_id, b.query_id);
   pair.T_match_a_match_b = map_.relative_pose(a.match_id, b.match_id);
-  pair.query_path_m = length(a.query_id, b.query_id);
-  pair.match_path_m = length(a.match_id, b.match_id);
+  pair.query_path_m = length_m(a.query_id, b.query_id);
+  pair.match_path_m = length_m(a.match_id, b.match_id);
   return consistent(pair, config_.drift);
 }
 

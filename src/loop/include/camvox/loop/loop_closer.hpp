@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <map>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -182,6 +183,8 @@ class LoopCloser {
   std::deque<LoopMeasurement> pending_;  ///< Confirmed each by itself, by age.
   std::deque<LoopMeasurement> loops_;    ///< Accepted, by age.
   std::deque<KeyframeId> recent_;        ///< Keyframes taken in last.
+  /// Of consider(): lengths of paths from a keyframe, computed once for all pairs of loops.
+  mutable std::map<KeyframeId, std::map<KeyframeId, double>> paths_m_;
   int keyframes_since_correction_ = 0;
   LoopStatistics statistics_;
 };
