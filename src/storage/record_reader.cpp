@@ -93,7 +93,9 @@ bool ChunkRecords::next(RawRecord& record) {
   return true;
 }
 
-Result<Bytes> ChunkLoader::load(const Chunk& chunk, ByteBuffer& buffer) {
+Result<Bytes> ChunkLoader::load(const Chunk& chunk,
+                                ByteBuffer& buffer,
+                                std::optional<std::uint32_t> crc_in_file) {
   const auto compression = parse_compression(chunk.compression);
   if (!compression) {
     return Status(StatusCode::kUnsupported,
@@ -105,9 +107,10 @@ Result<Bytes> ChunkLoader::load(const Chunk& chunk, ByteBuffer& buffer) {
         *compression, records, chunk.uncompressed_size, limits_.max_chunk_size, buffer);
     if (!status.ok()) return status;
     records = buffer.view();
+    crc_in_file.reset();
   }
   if (verify_crc_ && chunk.uncompressed_crc != 0) {
-    const std::uint32_t crc = crc32(records);
+    const std::uint32_t crc = crc_in_file ? *crc_in_file : crc32(records);
     if (crc != chunk.uncompressed_crc) {
       return Status(StatusCode::kCrcMismatch,
                     "chunk CRC is " + hex(crc) + ", written as " + hex(chunk.uncompressed_crc));

@@ -79,8 +79,11 @@ class ChunkLoader {
   ChunkLoader(const ReadLimits& limits, bool verify_crc)
       : limits_(limits), verify_crc_(verify_crc) {}
 
-  /// The records of the chunk: in place when it is not compressed, else in `buffer`.
-  Result<Bytes> load(const Chunk& chunk, ByteBuffer& buffer);
+  /// The records of the chunk: in place when it is not compressed, else in `buffer`. A caller that
+  /// has the CRC of the bytes in the file passes it: it serves a chunk that is not compressed.
+  Result<Bytes> load(const Chunk& chunk,
+                     ByteBuffer& buffer,
+                     std::optional<std::uint32_t> crc_in_file = std::nullopt);
 
   /// What is left of the records of a chunk that was cut off; never fails.
   Bytes load_prefix(const Chunk& chunk, ByteBuffer& buffer);

@@ -42,6 +42,7 @@ class McapStreamReader {
   [[nodiscard]] bool open_chunk();
   void note(StatusCode code, std::string what);
   void sum(const RawRecord& raw);
+  void sum_chunk(Bytes content, const Chunk& chunk);
   void check_crc(const RawRecord& raw);
 
   StreamReaderOptions options_;
@@ -54,7 +55,8 @@ class McapStreamReader {
   Record record_;
   Status status_;
   std::uint64_t offset_ = 0;
-  std::uint32_t crc_ = 0;  ///< Of the data section, then of the summary.
+  std::uint32_t crc_ = 0;        ///< Of the data section, then of the summary.
+  std::uint32_t chunk_crc_ = 0;  ///< Of the last chunk, as it is in the file.
   std::uint64_t summary_start_ = 0;
   std::vector<FileProblem> problems_;
 };
