@@ -120,6 +120,7 @@ struct Smooth {
   LocalPlanes rank;         ///< Of reflectivity.
   LocalPlanes inverse;      ///< Of the inverse range: planes in space are planes in it.
   cv::Mat nearest_inverse;  ///< Of the nearest return around.
+  cv::Mat mixed;            ///< 8U; where near and far returns alternate over more than an edge.
 };
 
 /// Sums over a Gaussian window of what is in the cells, times powers of the distance.
@@ -198,6 +199,26 @@ LocalPlanes fit_planes(const cv::Mat& weighted,
   return planes;
 }
 
+constexpr float kNothing = 1e3F;  ///< Inverse range of cells without a return.
+
+/// Where something moved while scans were accumulated, and in foliage, near and far returns lie
+/// side by side all over; at an edge they do so on a strip only.
+cv::Mat mixed_regions(const cv::Mat& nearest, const cv::Mat& farthest, double sigma) {
+  constexpr double kMaxStep = 0.2;  // of the inverse range
+  cv::Mat near_around;
+  cv::Mat far_around;
+  cv::dilate(nearest, near_around, cv::Mat::ones(3, 3, CV_8U));
+  cv::erode(farthest, far_around, cv::Mat::ones(3, 3, CV_8U));
+  cv::Mat mixed = far_around < (1.0 - kMaxStep) * near_around;
+  const int strip = 2 * static_cast<int>(std::ceil(5.0 * sigma)) + 1;
+  const cv::Mat window = cv::Mat::ones(strip, strip, CV_8U);
+  // Closed first: a cell or two without a return of one kind do not part a region.
+  cv::morphologyEx(mixed, mixed, cv::MORPH_CLOSE, cv::Mat::ones(3, 3, CV_8U));
+  cv::morphologyEx(mixed, mixed, cv::MORPH_OPEN, window);
+  cv::dilate(mixed, mixed, window);
+  return mixed;
+}
+
 Smooth smooth_images(const std::vector<Return>& returns,
                      const Panorama& panorama,
                      double sigma,
@@ -209,6 +230,7 @@ Smooth smooth_images(const std::vector<Return>& returns,
   cv::Mat inverse = zero.clone();
   Smooth smooth;
   smooth.nearest_inverse = zero.clone();
+  cv::Mat farthest(size, CV_32F, cv::Scalar(kNothing));
   for (const Return& r : returns) {
     // Spread over four cells: the place within a cell is not lost.
     const int u = std::min(static_cast<int>(r.cell.x()), size.width - 2);
@@ -226,6 +248,8 @@ Smooth smooth_images(const std::vector<Return>& returns,
     }
     float& nearest = smooth.nearest_inverse.at<float>(v + (b > 0.5F), u + (a > 0.5F));
     nearest = std::max(nearest, r.inverse_range);
+    float& far = farthest.at<float>(v + (b > 0.5F), u + (a > 0.5F));
+    far = std::min(far, r.inverse_range);
   }
   const WindowMoments window(sigma);
   const PositionMoments moments{window(count, 0, 0),
@@ -239,6 +263,7 @@ Smooth smooth_images(const std::vector<Return>& returns,
   smooth.rank = fit_planes(rank, moments, window, sigma);
   if (stop.stop_requested()) return smooth;
   smooth.inverse = fit_planes(inverse, moments, window, sigma);
+  smooth.mixed = mixed_regions(smooth.nearest_inverse, farthest, sigma);
   const int reach = 2 * static_cast<int>(std::ceil(1.5 * sigma)) + 1;
   cv::dilate(smooth.nearest_inverse, smooth.nearest_inverse, cv::Mat::ones(reach, reach, CV_8U));
   return smooth;
@@ -291,7 +316,12 @@ void collect(const Smooth& smooth,
   depth.magnitude = depth.magnitude.mul(scale);
   const auto strong_depth = static_cast<float>((1.0 - 1.0 / config.min_depth_ratio) / spread);
   cv::Mat depth_edge(depth.magnitude.size(), CV_8U, cv::Scalar(0));
+  const auto is_mixed = [&](const Ridge& ridge) {
+    return !in_lines && smooth.mixed.at<std::uint8_t>(static_cast<int>(std::lround(ridge.v)),
+                                                      static_cast<int>(std::lround(ridge.u))) != 0;
+  };
   for (const Ridge& ridge : find_ridges(depth, strong_depth, config.min_length)) {
+    if (is_mixed(ridge)) continue;
     if (!is_crest(depth, ridge, 2.0 * sigma)) continue;
     depth_edge.at<std::uint8_t>(static_cast<int>(std::lround(ridge.v)),
                                 static_cast<int>(std::lround(ridge.u))) = 255;
@@ -307,6 +337,7 @@ void collect(const Smooth& smooth,
                                     static_cast<int>(std::lround(ridge.u))) != 0) {
       continue;
     }
+    if (is_mixed(ridge)) continue;
     // The lasers of a spinning lidar differ, so each line has a brightness of its own.
     if (in_lines && std::abs(ridge.normal.y()) > 0.7) continue;
     if (is_crest(smooth.rank.gradient, ridge, 2.0 * sigma) &&
