@@ -17,7 +17,6 @@ constexpr std::size_t kPatienceLockstep = 256;
 
 LoopClosingComponentConfig checked(LoopClosingComponentConfig config) {
   auto problems = sensors::check(config.camera);
-  for (auto& problem : sensors::check(config.rig)) problems.push_back(std::move(problem));
   if (!problems.empty()) throw config::ConfigError(std::move(problems));
   return config;
 }

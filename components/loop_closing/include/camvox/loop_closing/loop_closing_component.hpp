@@ -12,7 +12,6 @@
 #include "camvox/loop_closing/map_order.hpp"
 #include "camvox/loop_closing/worker.hpp"
 #include "camvox/sensors/camera_intrinsics.hpp"
-#include "camvox/sensors/rig.hpp"
 
 namespace camvox {
 
@@ -23,7 +22,6 @@ struct LoopClosingComponentConfig {
   int max_waiting = 4;    ///< Live: keyframes that wait for the worker; further ones are left out.
   loop::LoopCloserConfig loop;
   sensors::CameraIntrinsics camera;
-  sensors::RigConfig rig;
 
   template <typename Self, typename Visitor>
   static void visit(Self& self, Visitor&& field) {
@@ -32,7 +30,6 @@ struct LoopClosingComponentConfig {
     field("max_waiting", self.max_waiting, config::at_least(1), config::at_most(1000));
     field("loop", self.loop);
     field("camera", self.camera);
-    field("rig", self.rig);
   }
 };
 
