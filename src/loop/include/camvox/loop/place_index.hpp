@@ -49,7 +49,7 @@ struct PlaceScore {
 /// descriptors; it divides by single bits.)
 ///
 /// The work of a query grows with the logarithm of the number of descriptors. Deterministic.
-/// Not thread-safe. It is not saved with a map: building it again takes about 1 ms per keyframe.
+/// Not thread-safe. It is not saved with a map: building it again takes 1 to 2 ms per keyframe.
 class PlaceIndex {
  public:
   /// Throws config::ConfigError.
