@@ -141,7 +141,12 @@ void LoopClosingComponent::corrected(const Header& header, const loop::Correctio
   closer_.finish(correction);
   const bool current = correction.map_epoch == closer_.map().map_epoch();
   outdated_ += current ? 0 : 1;
-  answer_keyframe(header, current && correction.summary.usable ? &correction : nullptr);
+  if (correction.T_map_camera.empty()) {
+    context_.log().warn("loop {} -> {} not closed: the pose graph does not bear it",
+                        correction.loop.query_id,
+                        correction.loop.match_id);
+  }
+  answer_keyframe(header, current && !correction.T_map_camera.empty() ? &correction : nullptr);
 }
 
 void LoopClosingComponent::answer_keyframe(const Header& header,

@@ -111,12 +111,14 @@ Correction correct(const CorrectionTask& task) {
   correction.loop = task.loop;
   correction.summary = solution.summary;
   if (!solution.summary.usable) return correction;
-  for (std::size_t i = 0; i < task.keyframe_ids.size(); ++i) {
-    correction.T_map_camera.emplace_back(task.keyframe_ids[i], solution.T_map_node[i]);
-  }
   const std::size_t first_loop = task.graph.edges.size() - task.robust_edges.size();
   for (const auto edge : solution.outliers) {
     correction.rejected_loops.push_back(task.robust_edges[edge - first_loop]);
+  }
+  // Without its loops the graph says what the map says already: nothing to correct.
+  if (correction.rejected_loops.size() == task.robust_edges.size()) return correction;
+  for (std::size_t i = 0; i < task.keyframe_ids.size(); ++i) {
+    correction.T_map_camera.emplace_back(task.keyframe_ids[i], solution.T_map_node[i]);
   }
   return correction;
 }

@@ -141,6 +141,23 @@ TEST_F(LoopCloserTest, ForgetsRemovedKeyframes) {
   for (const auto& loop : closer_.loops()) EXPECT_NE(loop.match_id, change.removed[0]);
 }
 
+// A graph that rejects all its loops has nothing to say; it must not pass for a closed loop.
+TEST(CorrectTest, RejectedLoopsMoveNothing) {
+  CorrectionTask task;
+  task.keyframe_ids = {1, 2};
+  task.graph.T_map_node = {SE3(), SE3(geometry::SO3(), {1.0, 0.0, 0.0})};
+  task.graph.fixed = {true, false};
+  const auto covariance = path_sigma(0.0, DriftConfig()).covariance();
+  task.graph.edges.push_back({0, 1, task.graph.T_map_node[1], covariance, false});
+  task.graph.edges.push_back({0, 1, SE3(geometry::SO3(), {9.0, 0.0, 0.0}), covariance, true});
+  task.robust_edges = {{2, 1}};
+  const auto correction = correct(task);
+  EXPECT_EQ(correction.rejected_loops, task.robust_edges);
+  EXPECT_TRUE(correction.T_map_camera.empty());
+  task.graph.edges.back().T_from_to = SE3(geometry::SO3(), {1.05, 0.0, 0.0});
+  EXPECT_EQ(correct(task).T_map_camera.size(), 2U);
+}
+
 TEST_F(LoopCloserTest, NothingIsKnownAtFirst) {
   EXPECT_TRUE(closer_.detect(1).candidates.empty());
   const auto frame = std::make_shared<features::FrameFeatures>();

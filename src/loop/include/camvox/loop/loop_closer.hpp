@@ -91,6 +91,7 @@ struct CorrectionTask {
 struct Correction {
   std::uint64_t map_epoch = 0;
   LoopMeasurement loop;
+  /// None when there is no solution, or when every loop was rejected: then nothing is to be moved.
   std::vector<std::pair<KeyframeId, geometry::SE3>> T_map_camera;
   std::vector<std::pair<KeyframeId, KeyframeId>> rejected_loops;  ///< Query and match.
   optimization::PoseGraphSummary summary;
