@@ -31,7 +31,7 @@ class EndToEnd : public CommandFixture {
 
   [[nodiscard]] Result run_all(const fs::path& output, const std::vector<std::string>& more = {}) {
     std::vector<std::string> words = {"run",
-                                      "camvox.yaml",
+                                      "replay.yaml",
                                       "--bag",
                                       recording(),
                                       "--parameters",
@@ -89,7 +89,7 @@ TEST_F(EndToEnd, WithoutLidarNothingIsTrackedAndNothingBreaks) {
 TEST_F(EndToEnd, WhatWasComputedIsSavedOnCtrlC) {
   const auto output = folder_ / "cut";
   container_ = begin({"run",
-                      "camvox.yaml",
+                      "replay.yaml",
                       "--bag",
                       recording(),
                       "--parameters",

@@ -20,7 +20,7 @@ struct TrackerConfig {
   int min_inliers = 30;                ///< Fewer are no pose.
   int min_inliers_relocalised = 50;    ///< The same after the pose was lost.
   double motion_radius_px = 15.0;      ///< Search around the place that the motion predicts.
-  double motion_radius_gyro_px = 10.0;  ///< The same when the gyro predicts the rotation.
+  double motion_radius_gyro_px = 6.0;  ///< The same when the gyro predicts the rotation.
   double map_radius_px = 7.5;           ///< Search for landmarks of the local map.
   double gyro_sigma_deg = 0.2;          ///< Of the rotation between two frames; 0: no prior.
   bool localisation_only = false;       ///< Make no keyframes: the map stays as it is.
