@@ -24,7 +24,7 @@ constexpr float kInlierSigmas = 3.5F;
 /// How far a neighbour's plane may be off, as a share of depth, beside the noise.
 constexpr float kPlaneTolerance = 0.004F;
 /// A surface may go on this far beyond its outermost returns.
-const float kBeyond_px = getenv("BEYOND") ? (float)atof(getenv("BEYOND")) : 1.5F;
+constexpr float kBeyond_px = 1.5F;
 /// A return without a surface stands for itself this far.
 constexpr float kLoneReach_px = 1.5F;
 /// Slope of a lone return's surface, as that of an incidence of 63 degrees.

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cmath>
-#include <cstdlib>
 
 #include "camvox/config/target_clones.hpp"
 #include "cell_grid.hpp"
@@ -36,12 +35,12 @@ inline constexpr double kPriorReturns = 6.0;
 /// Steepest surface to expect: d rho / d px = this * rho / f (tangent of the incidence angle).
 inline constexpr double kSteepest = 20.0;
 /// Relief that the scatter of the returns does not show, as a share of their noise.
-inline double kRelief = getenv("RELIEF") ? atof(getenv("RELIEF")) : 0.4;
-inline double kExcess = getenv("EXC") ? atof(getenv("EXC")) : 1.0;
-inline double kRough = getenv("ROUGH") ? atof(getenv("ROUGH")) : 0.005;
+inline constexpr double kRelief = 0.4;
+/// Scatter about a plane that is taken for relief, as a share of inverse depth.
+inline constexpr double kRough = 0.005;
 /// Error of direction that returns of one place have in common (the beam has a width, and the
 /// nearer part of a slope answers more strongly), as a share of their noise.
-inline double kPointingBias = getenv("POINT") ? atof(getenv("POINT")) : 0.3;
+inline constexpr double kPointingBias = 0.3;
 /// No surface is flatter than this share of its depth.
 inline constexpr double kUnevenness = 0.0005;
 
@@ -93,7 +92,7 @@ fit_plane(const double* m, double u_c, double v_c, double cosine, const NoiseMod
   const double pointing = kPointingBias * noise.angle_sigma_px;
   const double excess = fit.sum_squares - dof * fit.noise_variance;
   const double structure = excess > 0.0 ? excess * inverse_n : 0.0;
-  fit.variance = scatter * (inverse_n + distance2 + over_cell) + kExcess * structure +
+  fit.variance = scatter * (inverse_n + distance2 + over_cell) + structure +
                  kRelief * kRelief * fit.noise_variance + along * along +
                  g2 * (shift_px + pointing * pointing);
   return fit;
