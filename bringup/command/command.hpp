@@ -41,6 +41,7 @@ void add_component(CLI::App& app, const CommonOptions& common, Action& action);
 void add_topic(CLI::App& app, const CommonOptions& common, Action& action);
 void add_param(CLI::App& app, const CommonOptions& common, Action& action);
 void add_bag(CLI::App& app, const CommonOptions& common, Action& action);
+void add_calibrate(CLI::App& app, Action& action);
 void add_evaluate(CLI::App& app, Action& action);
 void add_import(CLI::App& app, Action& action);
 void add_report(CLI::App& app, Action& action);

@@ -41,6 +41,7 @@ int main(int argc, char** argv) {
   camvox::command::add_topic(app, common, action);
   camvox::command::add_param(app, common, action);
   camvox::command::add_bag(app, common, action);
+  camvox::command::add_calibrate(app, action);
   camvox::command::add_evaluate(app, action);
   camvox::command::add_import(app, action);
   camvox::command::add_report(app, action);
