@@ -48,7 +48,7 @@ TEST(Calibrator, FindsTheTruthFromFarOff) {
   ASSERT_EQ(result.status, CalibrationStatus::kDone) << result.reason;
   EXPECT_TRUE(result.accepted) << result.reason;
   EXPECT_LT(error_deg(result.T_camera_lidar), 0.1);  // what the issue asks for
-  const auto shift =
+  const Eigen::Vector3d shift =
       result.T_camera_lidar.translation() - test::true_T_camera_lidar().translation();
   EXPECT_LT(shift.norm(), 0.02);
   EXPECT_GT(result.score_after, result.score_before);
