@@ -52,6 +52,14 @@ class Builder {
     }
   }
 
+  /// Edges between the same few keyframes repeat each other: together they are worth one chain.
+  void share_information() {
+    const auto nodes = std::max<std::size_t>(task_.keyframe_ids.size(), 2);
+    const double repeated =
+        static_cast<double>(task_.graph.edges.size()) / static_cast<double>(nodes - 1);
+    for (auto& edge : task_.graph.edges) edge.covariance_to *= std::max(1.0, repeated);
+  }
+
   void add_loop(const LoopMeasurement& loop) {
     const geometry::Matrix6d covariance =
         loop.covariance_query + path_sigma(0.0, config_.drift).covariance();
@@ -87,6 +95,26 @@ class Builder {
   std::unordered_map<KeyframeId, std::size_t> node_of_;
 };
 
+/// The robust cost has a minimum at the uncorrected map, however true the loops: far off, they have
+/// hardly any weight. The other start is where all loops hold; that with the lower cost counts, so
+/// loops must be worth what they bend.
+optimization::PoseGraphSolution solve_from_best_start(const CorrectionTask& task) {
+  constexpr double kAny_sigma = 1e6;
+  auto all_hold = task.config;
+  all_hold.kernel_width_sigma = all_hold.outlier_sigma = kAny_sigma;
+  auto keep_all = task.config;
+  keep_all.outlier_sigma = kAny_sigma;
+  auto graph = task.graph;
+  graph.T_map_node = optimization::solve(graph, all_hold).T_map_node;
+  const auto bent = optimization::solve(graph, keep_all);
+  const auto as_is = optimization::solve(task.graph, keep_all);
+  const bool use_bent = bent.summary.usable && bent.summary.cost_after < as_is.summary.cost_after;
+  graph.T_map_node = use_bent ? bent.T_map_node : as_is.T_map_node;
+  auto solution = optimization::solve(graph, task.config);
+  solution.summary.cost_before = as_is.summary.cost_before;
+  return solution;
+}
+
 }  // namespace
 
 CorrectionTask build_correction(const MapReplica& map,
@@ -99,13 +127,14 @@ CorrectionTask build_correction(const MapReplica& map,
   task.config = config.pose_graph;
   Builder builder(map, config, task);
   builder.add_map();
+  builder.share_information();
   for (const auto& loop : loops) builder.add_loop(loop);
   builder.fix_roots();
   return task;
 }
 
 Correction correct(const CorrectionTask& task) {
-  const auto solution = optimization::solve(task.graph, task.config);
+  const auto solution = solve_from_best_start(task);
   Correction correction;
   correction.map_epoch = task.map_epoch;
   correction.loop = task.loop;
