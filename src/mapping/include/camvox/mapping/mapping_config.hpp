@@ -12,7 +12,7 @@ namespace camvox::mapping {
 struct MappingConfig {
   std::string depth_model = "metric";  ///< Or virtual_stereo: the paper's, for comparison.
   double virtual_baseline_m = 0.05;    ///< Of virtual_stereo.
-  double sigma_px = 0.7;               ///< Of a feature of octave 0; grows with the octave's scale.
+  double sigma_px = 1.0;               ///< Of a feature of octave 0; grows with the octave's scale.
   double max_depth_sigma_ratio = 0.1;  ///< Depth less certain than this share is not used.
   int local_map_keyframes = 80;        ///< What tracking gets at most.
   int local_map_landmarks = 8000;      ///< The same; the nearest keyframes' first.

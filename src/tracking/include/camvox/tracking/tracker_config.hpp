@@ -13,7 +13,7 @@ namespace camvox::tracking {
 struct TrackerConfig {
   std::string depth_model = "metric";  ///< Or virtual_stereo: the paper's, for comparison.
   double virtual_baseline_m = 0.05;    ///< Of virtual_stereo.
-  double sigma_px = 0.7;               ///< Of a feature of octave 0; grows with the octave's scale.
+  double sigma_px = 1.0;               ///< Of a feature of octave 0; grows with the octave's scale.
   double close_depth_m = 130.0;        ///< Depth beyond founds no landmark.
   double max_depth_sigma_ratio = 0.1;  ///< Depth less certain than this share is not used.
   int min_features_with_depth = 100;   ///< The first keyframe needs so many.
@@ -21,9 +21,9 @@ struct TrackerConfig {
   int min_inliers_relocalised = 50;    ///< The same after the pose was lost.
   double motion_radius_px = 15.0;      ///< Search around the place that the motion predicts.
   double motion_radius_gyro_px = 6.0;  ///< The same when the gyro predicts the rotation.
-  double map_radius_px = 7.5;           ///< Search for landmarks of the local map.
-  double gyro_sigma_deg = 0.2;          ///< Of the rotation between two frames; 0: no prior.
-  bool localisation_only = false;       ///< Make no keyframes: the map stays as it is.
+  double map_radius_px = 7.5;          ///< Search for landmarks of the local map.
+  double gyro_sigma_deg = 0.2;         ///< Of the rotation between two frames; 0: no prior.
+  bool localisation_only = false;      ///< Make no keyframes: the map stays as it is.
   /// Wait for a map and a place in it instead of starting a map; localisation_only implies it.
   bool relocalise_at_start = false;
   int relocalisation_interval = 5;  ///< Frames between two requests while lost.
