@@ -3,6 +3,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "camvox/component/progress.hpp"
+
 namespace camvox::mapping_component {
 
 JobRunner::JobRunner(Done done) : done_(std::move(done)), thread_([this] { run(); }) {}
@@ -34,9 +36,11 @@ void JobRunner::run() {
     if (ending_) return;
     mapping::BundleJob job = *std::exchange(job_, std::nullopt);
     lock.unlock();
+    const double started_s = thread_processor_time_s();
     const auto summary = job.solve(&interrupted_);
+    const double time_s = thread_processor_time_s() - started_s;
     busy_ = false;  // before `done` tells, so that who is told may start the next
-    done_(std::move(job), summary);
+    done_(std::move(job), summary, time_s);
     lock.lock();
   }
 }

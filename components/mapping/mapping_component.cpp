@@ -44,10 +44,10 @@ MappingComponent::MappingComponent(Context& context)
 void MappingComponent::start() {
   if (config_.lockstep) return;
   runner_ = std::make_unique<mapping_component::JobRunner>(
-      [this](mapping::BundleJob job, optimization::BundleSummary summary) {
-        context_.post([this, job = std::move(job), summary] {
+      [this](mapping::BundleJob job, optimization::BundleSummary summary, double time_s) {
+        context_.post([this, job = std::move(job), summary, time_s] {
           const auto work = progress_.measure();
-          finish(job, summary);
+          finish(job, summary, time_s);
           publish_update(last_.header);
           publish_local_map(last_);
           start_next_job();
@@ -149,15 +149,17 @@ void MappingComponent::insert(const tracking::Keyframe& keyframe) {
 }
 
 void MappingComponent::adjust(mapping::BundleJob job) {
+  const double started_s = thread_processor_time_s();
   const auto summary = job.solve();
-  finish(job, summary);
+  finish(job, summary, thread_processor_time_s() - started_s);
 }
 
 void MappingComponent::finish(const mapping::BundleJob& job,
-                              const optimization::BundleSummary& summary) {
+                              const optimization::BundleSummary& summary,
+                              double time_s) {
   if (!mapper_.finish(job)) return;
   if (!config_.lockstep && job.newest != 0) mapper_.cull_keyframes(job.newest);
-  const auto text = summary.to_string(0.0);
+  const auto text = summary.to_string(time_s);
   context_.diagnostics().set(job.whole_map ? "full bundle adjustment" : "local bundle adjustment",
                              text);
   if (job.whole_map) context_.log().info("full bundle adjustment: {}", text);

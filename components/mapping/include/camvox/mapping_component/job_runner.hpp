@@ -14,8 +14,9 @@ namespace camvox::mapping_component {
 /// Solves bundle adjustments on a thread of its own, one at a time.
 class JobRunner {
  public:
-  /// `done` gets each solved job, on the runner's thread.
-  using Done = std::function<void(mapping::BundleJob job, optimization::BundleSummary summary)>;
+  /// `done` gets each solved job and the processor time that it took, on the runner's thread.
+  using Done = std::function<void(
+      mapping::BundleJob job, optimization::BundleSummary summary, double time_s)>;
 
   explicit JobRunner(Done done);
   JobRunner(const JobRunner&) = delete;

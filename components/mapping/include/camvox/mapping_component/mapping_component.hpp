@@ -66,7 +66,9 @@ class MappingComponent final : public Component {
   void answer(const Waiting& frame);
   void insert(const tracking::Keyframe& keyframe);
   void adjust(mapping::BundleJob job);
-  void finish(const mapping::BundleJob& job, const optimization::BundleSummary& summary);
+  void finish(const mapping::BundleJob& job,
+              const optimization::BundleSummary& summary,
+              double time_s);
   void start_next_job();
   void publish_local_map(const Waiting& frame);
   void publish_update(const Header& header);

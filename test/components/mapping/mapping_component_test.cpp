@@ -1,0 +1,220 @@
+#include "camvox/mapping_component/mapping_component.hpp"
+
+#include <gmock/gmock.h>
+
+#include <random>
+
+#include "camvox/component/fake_context.hpp"
+#include "camvox/conversion/map_messages.hpp"
+#include "camvox/conversion/pose.hpp"
+
+namespace camvox {
+namespace {
+
+using camvox_interfaces::msg::FramePose;
+using camvox_interfaces::msg::Keyframe;
+using camvox_interfaces::msg::LocalMap;
+using camvox_interfaces::msg::LoopCorrection;
+using camvox_interfaces::msg::MapUpdate;
+using camvox_interfaces::msg::Progress;
+using geometry::SE3;
+using ::testing::HasSubstr;
+
+constexpr std::size_t kPoints = 200;
+
+/// Points on a rough wall 10 m ahead, seen exactly by a camera that moves to the right.
+class MappingTest : public testing::Test {
+ protected:
+  MappingTest() {
+    std::mt19937 random(3);
+    std::uniform_real_distribution<double> unit(-1.0, 1.0);
+    for (std::size_t i = 0; i < kPoints; ++i) {
+      points_map_.emplace_back(4.0 * unit(random), 1.5 * unit(random), 10.0 + unit(random));
+      for (auto& byte : descriptors_.emplace_back().bytes) {
+        byte = static_cast<std::uint8_t>(random());
+      }
+    }
+  }
+
+  [[nodiscard]] static SE3 camera_at(double x_m) { return {geometry::SO3(), {x_m, 0.0, 0.0}}; }
+
+  /// Keyframe `id` of frame `id`; the first founds all landmarks, the others see them again.
+  [[nodiscard]] tracking::Keyframe keyframe(std::uint64_t id, double x_m) const {
+    const sensors::CameraIntrinsics camera;
+    tracking::Keyframe result;
+    result.id = result.frame_id = id;
+    result.stamp_ns = static_cast<std::int64_t>(id) * 1'000'000'000;
+    result.parent_id = id - 1;
+    result.T_map_camera = camera_at(x_m);
+    result.T_parent_camera = id == 1 ? SE3() : camera_at(0.3);
+    for (std::size_t i = 0; i < kPoints; ++i) {
+      const Eigen::Vector3d p = points_map_[i] - result.T_map_camera.translation();
+      const Eigen::Vector2f u_px(static_cast<float>(camera.fx_px * p.x() / p.z() + camera.cx_px),
+                                 static_cast<float>(camera.fy_px * p.y() / p.z() + camera.cy_px));
+      result.features.key_points.push_back({u_px.x(), u_px.y(), 0.0F, 50.0F, 0});
+      result.features.undistorted_px.push_back(u_px);
+      result.features.descriptors.push_back(descriptors_[i]);
+      result.features.depth_m.push_back(static_cast<float>(p.z()));
+      result.features.depth_sigma_m.push_back(0.02F);
+      result.landmark_ids.push_back(tracking::landmark_id(1, i));
+    }
+    return result;
+  }
+
+  void send_keyframe(std::uint64_t id, double x_m) {
+    fake_.send<Keyframe>("keyframe", [&](Keyframe& message) {
+      ASSERT_TRUE(conversion::write_keyframe(keyframe(id, x_m), message));
+    });
+  }
+  void send_pose(std::uint64_t frame_id, std::uint64_t reference_id) {
+    FramePose pose;
+    pose.header().frame_id(frame_id);
+    pose.reference_keyframe_id(reference_id);
+    fake_.send("frame_pose", pose);
+  }
+  void send_correction(std::uint64_t frame_id,
+                       const std::vector<std::pair<std::uint64_t, double>>& x_m) {
+    fake_.send<LoopCorrection>("loop_correction", [&](LoopCorrection& correction) {
+      correction.header().frame_id(frame_id);
+      correction.query_keyframe_id(frame_id);
+      correction.match_keyframe_id(1);
+      std::uint32_t count = 0;
+      for (const auto& [id, x] : x_m) {
+        correction.keyframe_ids()[count] = id;
+        correction.keyframe_poses()[count++] = conversion::to_array(camera_at(x));
+      }
+      correction.keyframe_ids_count(count);
+      correction.keyframe_poses_count(count);
+    });
+  }
+  [[nodiscard]] std::vector<std::shared_ptr<const LocalMap>> maps() const {
+    return fake_.published<LocalMap>("local_map");
+  }
+
+  std::vector<Eigen::Vector3d> points_map_;
+  std::vector<features::Descriptor> descriptors_;
+  FakeContext fake_;
+};
+
+TEST_F(MappingTest, AnswersEveryPoseWithTheMapAroundItsKeyframe) {
+  fake_.set_parameter("lockstep", true);
+  MappingComponent mapping(fake_);
+  mapping.start();
+  send_keyframe(1, 0.0);
+  send_pose(1, 1);
+  send_pose(2, 1);
+  ASSERT_EQ(maps().size(), 2U);
+  EXPECT_EQ(maps()[1]->header().frame_id(), 2U);
+  const auto map = conversion::read_local_map(*maps()[1]);
+  EXPECT_EQ(map.reference_keyframe_id, 1U);
+  EXPECT_EQ(map.next_keyframe_id, 2U);
+  ASSERT_EQ(map.landmarks.size(), kPoints);
+  EXPECT_LT((map.landmarks[7].p_map - points_map_[7]).norm(), 1e-4);
+  EXPECT_EQ(fake_.published<Progress>("progress").size(), 2U);
+  mapping.stop();
+}
+
+TEST_F(MappingTest, APoseWaitsForTheKeyframeThatItRefersTo) {
+  fake_.set_parameter("lockstep", true);
+  MappingComponent mapping(fake_);
+  mapping.start();
+  send_pose(1, 1);
+  EXPECT_TRUE(maps().empty());
+  send_keyframe(1, 0.0);
+  EXPECT_EQ(maps().size(), 1U);
+  mapping.stop();
+}
+
+TEST_F(MappingTest, TellsPosesAndEdgesThatChanged) {
+  fake_.set_parameter("lockstep", true);
+  MappingComponent mapping(fake_);
+  mapping.start();
+  for (const std::uint64_t id : {1U, 2U, 3U}) {
+    send_keyframe(id, 0.3 * static_cast<double>(id - 1));
+    send_pose(id, id);
+  }
+  std::set<std::uint64_t> told;
+  bool edge_1_2 = false;
+  for (const auto& update : fake_.published<MapUpdate>("map_update")) {
+    for (std::uint32_t i = 0; i < update->keyframe_ids_count(); ++i) {
+      told.insert(update->keyframe_ids()[i]);
+    }
+    for (std::uint32_t i = 0; i < update->edges_count(); ++i) {
+      const auto& edge = update->edges()[i];
+      edge_1_2 = edge_1_2 || (edge[0] == 1 && edge[1] == 2 && edge[2] > 100);
+    }
+  }
+  EXPECT_EQ(told, (std::set<std::uint64_t>{1, 2, 3}));
+  EXPECT_TRUE(edge_1_2);
+  mapping.stop();
+}
+
+TEST_F(MappingTest, InLockstepAKeyframeIsAnsweredAfterLoopClosing) {
+  fake_.set_parameter("lockstep", true);
+  fake_.set_parameter("wait_for_loop_closing", true);
+  MappingComponent mapping(fake_);
+  mapping.start();
+  send_keyframe(1, 0.0);
+  send_pose(1, 1);
+  EXPECT_TRUE(maps().empty());
+  send_correction(1, {});
+  ASSERT_EQ(maps().size(), 1U);
+  send_pose(2, 1);
+  EXPECT_EQ(maps().size(), 2U) << "no keyframe: nothing to wait for";
+  mapping.stop();
+}
+
+TEST_F(MappingTest, ACorrectionMovesTheMapAndRaisesTheEpoch) {
+  fake_.set_parameter("lockstep", true);
+  fake_.set_parameter("mapping.full_bundle_iterations", std::int64_t{0});
+  MappingComponent mapping(fake_);
+  mapping.start();
+  for (const std::uint64_t id : {1U, 2U, 3U}) {
+    send_keyframe(id, 0.3 * static_cast<double>(id - 1));
+    send_pose(id, id);
+  }
+  send_correction(3, {{1, 0.0}, {2, 0.35}, {3, 0.7}});
+  EXPECT_EQ(mapping.mapper().epoch(), 1U);
+  send_pose(4, 3);
+  const auto map = conversion::read_local_map(*maps().back());
+  EXPECT_EQ(map.map_epoch, 1U);
+  ASSERT_EQ(map.keyframes.size(), 3U);
+  EXPECT_NEAR(map.keyframes[2].T_map_camera.translation().x(), 0.7, 1e-9);
+  mapping.stop();
+}
+
+TEST_F(MappingTest, LiveTheAdjustedMapComesFromAThread) {
+  MappingComponent mapping(fake_);
+  mapping.start();
+  send_keyframe(1, 0.0);
+  send_pose(1, 1);
+  send_keyframe(2, 0.3);
+  send_pose(2, 2);
+  const std::size_t at_once = maps().size();
+  EXPECT_EQ(at_once, 2U) << "poses do not wait for bundle adjustment";
+  EXPECT_GE(fake_.run_posted(std::chrono::seconds(20)), 1U);
+  EXPECT_GT(maps().size(), at_once);
+  EXPECT_THAT(fake_.diagnostics().status().values["local bundle adjustment"], HasSubstr("cost"));
+  mapping.stop();
+}
+
+TEST_F(MappingTest, AMalformedKeyframeIsRefusedByName) {
+  MappingComponent mapping(fake_);
+  mapping.start();
+  const auto send_broken = [this] {
+    fake_.send<Keyframe>("keyframe", [&](Keyframe& message) {
+      ASSERT_TRUE(conversion::write_keyframe(keyframe(9, 0.0), message));
+      message.depth_count(3);
+    });
+  };
+  try {
+    send_broken();
+    FAIL() << "taken";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_THAT(error.what(), HasSubstr("keyframe 9: lists of different length"));
+  }
+  mapping.stop();
+}
+
+}  // namespace
+}  // namespace camvox
