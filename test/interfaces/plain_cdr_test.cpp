@@ -210,6 +210,7 @@ TEST(PlainCdrBytes, OfScanEqualFastCdrs) {
         .sequence(s->points(), s->points_count())
         .sequence(s->point_offset_ns(), s->point_offset_ns_count())
         .sequence(s->point_line(), s->point_line_count());
+    expected << s->stationary() << s->padding_end();
     EXPECT_EQ(message_type<Scan>().to_cdr(s.get()), expected.bytes());
   }
 }

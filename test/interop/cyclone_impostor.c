@@ -28,7 +28,7 @@ int main(int argc, char** argv) {
     const Imu nonsense = {.nonsense = 0xFFFFFFFFu - i};
     CHECK(dds_write(imu_writer, &nonsense) == 0);
   }
-  publish_floats(cloud_writer, 400004); /* one point over capacity */
+  publish_floats(cloud_writer, 4 * (262144 + 1)); /* one point over SCAN_POINTS */
   publish_floats(cloud_writer, 5);      /* a point and a quarter */
   publish_floats(cloud_writer, 8);      /* the only good one */
   CHECK(dds_wait_for_acks(imu_writer, kPatience) == 0);

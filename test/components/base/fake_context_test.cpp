@@ -279,7 +279,9 @@ TEST(FakeContext, NamesWhatIsWrongInTheTest) {
 TEST(FakeContext, RefusesCountersOverCapacity) {
   FakeContext fake;
   CropComponent component(fake);
-  const auto overfull = [](Cloud& cloud) { cloud.points_count() = 100'001; };
+  const auto overfull = [](Cloud& cloud) {
+    cloud.points_count() = camvox_interfaces::msg::SCAN_POINTS + 1;
+  };
   EXPECT_THAT([&] { fake.send<Cloud>("cloud", overfull); },
               ThrowsMessage<std::logic_error>(HasSubstr("capacity")));
   auto publisher = fake.advertise<Cloud>({"out", "/out"});
