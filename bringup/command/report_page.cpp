@@ -8,6 +8,8 @@
 namespace camvox::command {
 namespace {
 
+using trajectory::escaped;
+
 constexpr std::string_view kStyle = R"(
 body { font: 15px/1.5 system-ui, sans-serif; color: #222; max-width: 1100px; margin: 2em auto;
        padding: 0 1em; }
@@ -22,22 +24,6 @@ figure { margin: 1em 0; } img, svg { max-width: 100%; height: auto; }
 figcaption { color: #666; font-size: .9em; }
 pre { background: #f4f6f8; padding: 1em; overflow: auto; font-size: .85em; }
 )";
-
-std::string escaped(std::string_view text) {
-  std::string result;
-  for (const char c : text) {
-    if (c == '<') {
-      result += "&lt;";
-    } else if (c == '>') {
-      result += "&gt;";
-    } else if (c == '&') {
-      result += "&amp;";
-    } else {
-      result += c;
-    }
-  }
-  return result;
-}
 
 std::string base64(std::string_view bytes) {
   static constexpr std::string_view kLetters =

@@ -43,22 +43,6 @@ double tick_step(const Range& range) {
   return 10.0 * power;
 }
 
-std::string escaped(const std::string& text) {
-  std::string result;
-  for (const char c : text) {
-    if (c == '<') {
-      result += "&lt;";
-    } else if (c == '>') {
-      result += "&gt;";
-    } else if (c == '&') {
-      result += "&amp;";
-    } else {
-      result += c;
-    }
-  }
-  return result;
-}
-
 class Drawing {
  public:
   explicit Drawing(const Chart& chart) : chart_(chart) {
@@ -203,6 +187,22 @@ class Drawing {
 };
 
 }  // namespace
+
+std::string escaped(std::string_view text) {
+  std::string result;
+  for (const char c : text) {
+    if (c == '<') {
+      result += "&lt;";
+    } else if (c == '>') {
+      result += "&gt;";
+    } else if (c == '&') {
+      result += "&amp;";
+    } else {
+      result += c;
+    }
+  }
+  return result;
+}
 
 std::string to_svg(const Chart& chart) { return Drawing(chart).draw(); }
 

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace camvox::trajectory {
@@ -23,6 +24,9 @@ struct Chart {
   int width_px = 760;
   int height_px = 420;
 };
+
+/// Text as it stands in XML and HTML: < > & are spelled out.
+[[nodiscard]] std::string escaped(std::string_view text);
 
 /// Draws `chart`. Points that are not finite leave gaps. Long lines are thinned to what can be
 /// seen.
