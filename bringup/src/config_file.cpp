@@ -1,9 +1,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <fstream>
-#include <optional>
-#include <sstream>
 
 #include "camvox/bringup/parameter_file.hpp"
 #include "camvox/bringup/system_config.hpp"
@@ -15,16 +12,6 @@ namespace {
 
 const std::vector<std::string> kSections = {
     "container", "topics", "parameters", "parameter_files", "components"};
-
-std::optional<std::string> read_text(const std::filesystem::path& file) {
-  std::error_code ignored;
-  std::ifstream stream(file);
-  std::ostringstream text;
-  if (std::filesystem::is_directory(file, ignored) || !stream || !(text << stream.rdbuf())) {
-    return std::nullopt;
-  }
-  return text.str();
-}
 
 /// Reads one config; its members run through the file from top to bottom.
 class ConfigFileReader {
@@ -288,13 +275,9 @@ ConfigReadout parse_config(const std::string& text,
 
 ConfigReadout read_config_file(const std::filesystem::path& file,
                                const ConfigOverrides& overrides) {
-  const auto text = read_text(file);
-  if (!text) {
-    std::error_code ignored;
-    const bool exists = std::filesystem::exists(file, ignored);
-    return {{},
-            {{{file, 0}, "", exists ? "cannot be read, or is empty" : "there is no such file"}}};
-  }
+  ConfigReadout unread;
+  const auto text = read_text(file, unread.problems);
+  if (!text) return unread;
   return parse_config(*text, file, overrides);
 }
 

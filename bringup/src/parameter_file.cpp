@@ -1,8 +1,5 @@
 #include "camvox/bringup/parameter_file.hpp"
 
-#include <fstream>
-#include <sstream>
-
 #include "camvox/bringup/system_config.hpp"
 #include "yaml_reader.hpp"
 
@@ -10,17 +7,10 @@ namespace camvox::bringup {
 
 config::ParameterMap read_parameter_file(const std::filesystem::path& file,
                                          std::vector<config::Problem>& problems) {
-  std::error_code ignored;
-  std::ifstream stream(file);
-  std::ostringstream text;
-  if (std::filesystem::is_directory(file, ignored) || !stream || !(text << stream.rdbuf())) {
-    const bool exists = std::filesystem::exists(file, ignored);
-    problems.push_back(
-        {{file, 0}, "", exists ? "cannot be read, or is empty" : "there is no such file"});
-    return {};
-  }
+  const auto text = read_text(file, problems);
+  if (!text) return {};
   try {
-    return YamlReader(file, problems).parameters(YAML::Load(text.str()), "");
+    return YamlReader(file, problems).parameters(YAML::Load(*text), "");
   } catch (const YAML::Exception& error) {
     problems.push_back({{file, error.mark.line + 1}, "", "not valid YAML: " + error.msg});
     return {};

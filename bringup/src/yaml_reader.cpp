@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <charconv>
+#include <fstream>
 #include <limits>
 #include <map>
+#include <sstream>
 
 namespace camvox::bringup {
 namespace {
@@ -81,6 +83,20 @@ std::optional<Value> homogeneous(const std::vector<Value>& values) {
 }
 
 }  // namespace
+
+std::optional<std::string> read_text(const std::filesystem::path& file,
+                                     std::vector<config::Problem>& problems) {
+  std::error_code ignored;
+  std::ifstream stream(file);
+  std::ostringstream text;
+  if (!std::filesystem::is_directory(file, ignored) && stream && (text << stream.rdbuf())) {
+    return text.str();
+  }
+  const bool exists = std::filesystem::exists(file, ignored);
+  problems.push_back(
+      {{file, 0}, "", exists ? "cannot be read, or is empty" : "there is no such file"});
+  return std::nullopt;
+}
 
 config::Location YamlReader::location(const YAML::Node& node) const {
   return {origin_, node.Mark().is_null() ? 1 : node.Mark().line + 1};

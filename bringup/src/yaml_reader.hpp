@@ -2,6 +2,7 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include <filesystem>
 #include <functional>
 #include <optional>
 #include <string>
@@ -10,6 +11,10 @@
 #include "camvox/config/parameters.hpp"
 
 namespace camvox::bringup {
+
+/// The text of a file; nothing, and the reason among `problems`, when it cannot be read.
+std::optional<std::string> read_text(const std::filesystem::path& file,
+                                     std::vector<config::Problem>& problems);
 
 /// Turns YAML into typed values and collects what is wrong, with lines.
 class YamlReader {
