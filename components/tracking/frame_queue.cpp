@@ -38,13 +38,8 @@ bool FrameQueue::complete(const FrameInputs& inputs) const {
 
 std::optional<std::uint64_t> FrameQueue::next() const {
   if (keep_all_) {
-    // Ids without a gap: the next is known. After a gap the oldest complete one will do, once
-    // something newer shows that the stream has gone on.
-    for (const auto& [id, inputs] : frames_) {
-      if (!complete(inputs)) return std::nullopt;
-      return id;
-    }
-    return std::nullopt;
+    if (frames_.empty() || !complete(frames_.begin()->second)) return std::nullopt;
+    return frames_.begin()->first;
   }
   std::optional<std::uint64_t> newest;
   for (const auto& [id, inputs] : frames_) {

@@ -28,8 +28,8 @@ class FrameQueue {
   void add(const Sample<camvox_interfaces::msg::DepthImage>& depth);
   void add(const Sample<camvox_interfaces::msg::Cloud>& cloud);
 
-  /// Id of the next frame to work on, if there is one: the oldest complete one, once no older frame
-  /// can become complete first (keep_all); else the newest complete one.
+  /// Id of the next frame to work on, if there is one: the oldest, once it is complete (keep_all);
+  /// else the newest complete one, after older ones that lack nothing but their depth.
   [[nodiscard]] std::optional<std::uint64_t> next() const;
   /// Takes a frame out. Older ones are dropped: without an image silently, the others counted.
   [[nodiscard]] FrameInputs take(std::uint64_t frame_id);
