@@ -5,6 +5,7 @@
 #include <cstring>
 #include <filesystem>
 
+#include "camvox/conversion/header.hpp"
 #include "camvox/conversion/image.hpp"
 #include "camvox/conversion/pose.hpp"
 #include "cloud_file.hpp"
@@ -154,10 +155,7 @@ void DenseMapComponent::on_update(const MapUpdate& update) {
 void DenseMapComponent::publish() {
   if (cloud_.subscriber_count() == 0 || map_.size() == 0) return;
   auto cloud = cloud_.loan();
-  const auto now_ns = context_.now_ns();
-  cloud->header().stamp().sec(static_cast<std::int32_t>(now_ns / 1'000'000'000));
-  cloud->header().stamp().nanosec(static_cast<std::uint32_t>(now_ns % 1'000'000'000));
-  cloud->header().frame_id("map");
+  cloud->header(conversion::to_header(context_.now_ns(), "map"));
   write_points(map_.points(), *cloud);
   cloud_.publish(std::move(cloud));
 }

@@ -3,22 +3,19 @@
 #include <cmath>
 #include <cstring>
 
+#include "camvox/conversion/header.hpp"
+
 namespace camvox::depth_component {
 namespace {
 
 using camvox_interfaces::msg::DepthImage;
 using sensor_msgs::msg::Image;
 
-constexpr std::int64_t kSecond_ns = 1'000'000'000;
 constexpr auto kCameraFrame = "camera_optical_frame";
 constexpr float kMaxMillimetres = 65535.0F;
 
 std_msgs::msg::Header header_of(const DepthImage& depth) {
-  std_msgs::msg::Header header;
-  header.stamp().sec(static_cast<std::int32_t>(depth.header().stamp_ns() / kSecond_ns));
-  header.stamp().nanosec(static_cast<std::uint32_t>(depth.header().stamp_ns() % kSecond_ns));
-  header.frame_id(kCameraFrame);
-  return header;
+  return conversion::to_header(depth.header().stamp_ns(), kCameraFrame);
 }
 
 /// Everything but the pixels; those are `bytes` each, all zero.

@@ -1,23 +1,16 @@
 #include "camvox/tracking_component/odometry_output.hpp"
 
+#include "camvox/conversion/header.hpp"
 #include "camvox/conversion/pose.hpp"
 
 namespace camvox::tracking_component {
 namespace {
 
+using conversion::to_header;
 using geometry::SE3;
 
 constexpr std::size_t kMaxPathPoses = 4000;  // then every second goes
 constexpr double kPathStep_m = 0.1;
-constexpr std::int64_t kSecond_ns = 1'000'000'000;
-
-std_msgs::msg::Header make_header(std::int64_t stamp_ns, const char* frame) {
-  std_msgs::msg::Header header;
-  header.stamp().sec(static_cast<std::int32_t>(stamp_ns / kSecond_ns));
-  header.stamp().nanosec(static_cast<std::uint32_t>(stamp_ns % kSecond_ns));
-  header.frame_id(frame);
-  return header;
-}
 
 template <typename Vector>
 Vector to_message(const Eigen::Vector3d& v) {
@@ -50,7 +43,7 @@ geometry_msgs::msg::TransformStamped to_transform(std::int64_t stamp_ns,
                                                   const char* child,
                                                   const SE3& T_parent_child) {
   geometry_msgs::msg::TransformStamped message;
-  message.header(make_header(stamp_ns, parent));
+  message.header(to_header(stamp_ns, parent));
   message.child_frame_id(child);
   message.transform().translation(
       to_message<geometry_msgs::msg::Vector3>(T_parent_child.translation()));
@@ -89,7 +82,7 @@ void OdometryOutput::publish(const tracking::FrameResult& result) {
 
 void OdometryOutput::publish_odometry(const tracking::FrameResult& result, const SE3& T_odom_body) {
   auto message = odometry_.loan();
-  message->header(make_header(result.stamp_ns, "odom"));
+  message->header(to_header(result.stamp_ns, "odom"));
   message->child_frame_id("base_link");
   message->pose().pose(to_pose(T_odom_body));
   const geometry::Matrix6d Ad = T_body_camera_.adjoint();
@@ -119,7 +112,7 @@ void OdometryOutput::extend_path(std::int64_t stamp_ns, const SE3& T_map_body) {
   if (!poses.empty() && step_m < kPathStep_m) return;
   T_map_body_last_ = T_map_body;
   geometry_msgs::msg::PoseStamped pose;
-  pose.header(make_header(stamp_ns, "map"));
+  pose.header(to_header(stamp_ns, "map"));
   pose.pose(to_pose(T_map_body));
   poses.push_back(std::move(pose));
   if (poses.size() > kMaxPathPoses) {
@@ -128,7 +121,7 @@ void OdometryOutput::extend_path(std::int64_t stamp_ns, const SE3& T_map_body) {
     poses.resize(kept);
   }
   if (path_publisher_.subscriber_count() == 0) return;
-  path_.header(make_header(stamp_ns, "map"));
+  path_.header(to_header(stamp_ns, "map"));
   path_publisher_.publish(path_);
 }
 
