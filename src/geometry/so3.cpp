@@ -1,6 +1,7 @@
 #include "camvox/geometry/so3.hpp"
 
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 namespace camvox::geometry {
@@ -12,6 +13,9 @@ using Eigen::Vector3d;
 
 /// Farther than this from a rotation is a mistake of the caller, not rounding.
 constexpr double kNotARotation = 1e-3;
+
+/// A squared norm within this of one is that of a product of unit quaternions.
+constexpr double kRounding = 8.0 * std::numeric_limits<double>::epsilon();
 
 /// Below this squared angle the series beat the closed forms, which lose digits to cancellation.
 constexpr double kSmallAngle2 = 1e-4;
@@ -45,7 +49,8 @@ SO3::SO3(const Quaterniond& q) : q_(q) {
   if (!(std::abs(norm - 1.0) <= kNotARotation)) {
     throw std::logic_error("SO3: quaternion is not of unit norm: " + std::to_string(norm));
   }
-  q_.coeffs() /= norm;
+  // A unit quaternion stays as it is, to the bit: what was written comes back the same.
+  if (std::abs(q.squaredNorm() - 1.0) > kRounding) q_.coeffs() /= norm;
 }
 
 SO3 SO3::from_matrix(const Matrix3d& R) {
