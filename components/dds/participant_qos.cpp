@@ -1,11 +1,13 @@
 #include "participant_qos.hpp"
 
+#include <fastdds/rtps/transport/TransportInterface.h>
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <fastdds/rtps/transport/shared_mem/SharedMemTransportDescriptor.h>
 #include <fastrtps/utils/IPLocator.h>
 #include <fmt/format.h>
 
 #include <cstdlib>
+#include <memory>
 #include <random>
 #include <stdexcept>
 
@@ -29,6 +31,11 @@ std::uint32_t metatraffic_port(int domain_id, int participant_index) {
   return static_cast<std::uint32_t>(7400 + 250 * domain_id + 10 + 2 * participant_index);
 }
 
+/// RTPS 2.3, 9.6.1.1: metatraffic multicast port of a domain.
+std::uint32_t multicast_port(int domain_id) {
+  return static_cast<std::uint32_t>(7400 + 250 * domain_id);
+}
+
 Locator_t udp_locator(const std::string& address, std::uint32_t port) {
   Locator_t locator;
   locator.kind = LOCATOR_KIND_UDPv4;
@@ -36,6 +43,9 @@ Locator_t udp_locator(const std::string& address, std::uint32_t port) {
   locator.port = port;
   return locator;
 }
+
+/// Fast DDS chooses the port, and the addresses unless the machine's loopback is asked for.
+Locator_t any_port(bool loopback) { return udp_locator(loopback ? "127.0.0.1" : "0.0.0.0", 0); }
 
 std::string mebibytes(std::uint64_t bytes) { return fmt::format("{} MiB", bytes >> 20); }
 
@@ -54,13 +64,11 @@ void require_shared_memory(const ParticipantOptions& options) {
 void add_transports(eprosima::fastdds::dds::DomainParticipantQos& qos,
                     const ParticipantOptions& options) {
   qos.transport().use_builtin_transports = false;
-  if (options.udp) {
-    auto udp = std::make_shared<rtps::UDPv4TransportDescriptor>();
-    udp->sendBufferSize = kSocketBufferBytes;
-    udp->receiveBufferSize = kSocketBufferBytes;
-    if (options.network == Network::kLocalhost) udp->interfaceWhiteList = {"127.0.0.1"};
-    qos.transport().user_transports.push_back(udp);
-  }
+  auto udp = std::make_shared<rtps::UDPv4TransportDescriptor>();
+  udp->sendBufferSize = kSocketBufferBytes;
+  udp->receiveBufferSize = kSocketBufferBytes;
+  if (options.network == Network::kLocalhost) udp->interfaceWhiteList = {"127.0.0.1"};
+  qos.transport().user_transports.push_back(udp);
   if (options.shared_memory) {
     require_shared_memory(options);
     auto shm = std::make_shared<rtps::SharedMemTransportDescriptor>();
@@ -72,37 +80,36 @@ void add_transports(eprosima::fastdds::dds::DomainParticipantQos& qos,
 
 /// Where user data are received. Fast DDS derives the shared-memory port from the participant's
 /// index, so a process that replaces a killed one gets the killed one's port; a peer that still has
-/// that mapped writes into the void, and a reliable topic between the two never recovers. Hence a
-/// port of our own.
+/// that mapped writes into the void until its 512 places are full, and a reliable topic between the
+/// two may never recover. Hence a port of our own.
 void add_user_locators(eprosima::fastdds::dds::DomainParticipantQos& qos,
                        const ParticipantOptions& options) {
   auto& locators = qos.wire_protocol().default_unicast_locator_list;
-  const bool local = options.network == Network::kLocalhost;
-  locators.push_back(udp_locator(local ? "127.0.0.1" : "0.0.0.0", 0));
-  Locator_t shm;
-  shm.kind = LOCATOR_KIND_SHM;
-  shm.address[0] = 'U';  // unicast
-  shm.port = kFirstOwnShmPort + std::random_device()() % kFirstOwnShmPort;
-  locators.push_back(shm);
+  // The address of such a locator carries the host's number, which only the transport knows.
+  const std::unique_ptr<rtps::TransportInterface> shm(
+      rtps::SharedMemTransportDescriptor().create_transport());
+  shm->getDefaultUnicastLocators(locators,
+                                 kFirstOwnShmPort + std::random_device()() % kFirstOwnShmPort);
+  if (!options.udp) return;
+  locators.push_back(any_port(options.network == Network::kLocalhost));
 }
 
-void add_peers(eprosima::fastdds::dds::DomainParticipantQos& qos,
-               const ParticipantOptions& options) {
+/// Discovery goes over UDP alone, also where shared memory is on: see add_user_locators for what
+/// a process that replaces a killed one would inherit.
+void add_discovery(eprosima::fastdds::dds::DomainParticipantQos& qos,
+                   const ParticipantOptions& options) {
   auto& builtin = qos.wire_protocol().builtin;
-  std::vector<std::string> hosts = options.peers;
-  if (options.network == Network::kLocalhost) {
-    hosts = {"127.0.0.1"};
-    builtin.metatrafficUnicastLocatorList.push_back(udp_locator("127.0.0.1", 0));
-  }
+  const bool local = options.network == Network::kLocalhost;
+  builtin.metatrafficUnicastLocatorList.push_back(any_port(local));
+  const auto multicast = udp_locator("239.255.0.1", multicast_port(options.domain_id));
+  if (!local) builtin.metatrafficMulticastLocatorList.push_back(multicast);
+  const auto hosts = local ? std::vector<std::string>{"127.0.0.1"} : options.peers;
   for (const auto& host : hosts) {
     for (int i = 0; i < kLocalPeers; ++i) {
       builtin.initialPeersList.push_back(udp_locator(host, metatraffic_port(options.domain_id, i)));
     }
   }
-  if (options.network == Network::kSubnet && !hosts.empty()) {
-    builtin.initialPeersList.push_back(
-        udp_locator("239.255.0.1", static_cast<std::uint32_t>(7400 + 250 * options.domain_id)));
-  }
+  if (!local && !hosts.empty()) builtin.initialPeersList.push_back(multicast);
 }
 
 int parse_domain_id(const char* text) {
@@ -155,11 +162,14 @@ ParticipantOptions with_ros_environment(ParticipantOptions options) {
   return options;
 }
 
-eprosima::fastdds::dds::DomainParticipantQos participant_qos(const ParticipantOptions& options) {
+eprosima::fastdds::dds::DomainParticipantQos participant_qos(ParticipantOptions options) {
   if (!options.udp && !options.shared_memory) {
     throw std::runtime_error(
         "container.transports: at least one of shared_memory and udp is needed");
   }
+  // Discovery over shared memory does not survive a killed process in Fast DDS 2.9.1, so it always
+  // goes over UDP: this machine's loopback where user data are to take shared memory only.
+  if (!options.udp) options.network = Network::kLocalhost;
   eprosima::fastdds::dds::DomainParticipantQos qos;
   qos.name(options.name);
   const std::string enclave = "enclave=/;";
@@ -168,9 +178,8 @@ eprosima::fastdds::dds::DomainParticipantQos participant_qos(const ParticipantOp
   qos.wire_protocol().builtin.discovery_config.leaseDuration = {5, 0};
   qos.wire_protocol().builtin.discovery_config.leaseDuration_announcementperiod = {1, 0};
   add_transports(qos, options);
-  // Discovery over shared memory alone finds a participant by the ports of its index only.
-  if (options.udp && options.shared_memory) add_user_locators(qos, options);
-  if (options.udp) add_peers(qos, options);
+  if (options.shared_memory) add_user_locators(qos, options);
+  add_discovery(qos, options);
   return qos;
 }
 

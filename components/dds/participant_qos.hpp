@@ -8,6 +8,6 @@ namespace camvox::dds {
 
 /// Transports and discovery for the options. Throws std::runtime_error with what is missing.
 [[nodiscard]] eprosima::fastdds::dds::DomainParticipantQos participant_qos(
-    const ParticipantOptions& options);
+    ParticipantOptions options);
 
 }  // namespace camvox::dds

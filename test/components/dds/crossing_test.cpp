@@ -1,6 +1,8 @@
 #include <gmock/gmock.h>
 
 #include <atomic>
+#include <fstream>
+#include <set>
 
 #include "camvox/interfaces/camvox_interfaces.hpp"
 #include "camvox/test/deadline.hpp"
@@ -63,6 +65,32 @@ TEST_P(Crossing, InternalTopicReachesComponentsOfAnotherProcess) {
     EXPECT_TRUE(child.wrote("frame " + std::to_string(frame) + " points 10000\n"))
         << child.output();
   }
+  child.tell("quit");
+  EXPECT_EQ(child.wait(), 0);
+}
+
+/// Ports of the shared-memory transport that a process has mapped: its own, and one of each peer
+/// that it sends to this way.
+std::size_t mapped_shared_memory_ports(pid_t process) {
+  std::ifstream maps("/proc/" + std::to_string(process) + "/maps");
+  std::set<std::string> ports;
+  for (std::string line; std::getline(maps, line);) {
+    const auto name = line.find("/dev/shm/fastrtps_port");
+    if (name != std::string::npos) ports.insert(line.substr(name));
+  }
+  return ports.size();
+}
+
+TEST_P(Crossing, SharedMemoryIsTakenWhereBothHaveIt) {
+  std::atomic<int> received = 0;
+  test::TestContainer container(over(GetParam()));
+  container.component().subscribe<Cloud>(
+      kPort, [&](const auto&) { ++received; }, {.qos = qos::kFrames});
+  container.activate();
+  auto child = test::start_child(GetParam(), "write");
+  ASSERT_TRUE(wait_until([&] { return received >= 5; })) << child.output();
+  const std::size_t expected = GetParam() == std::string("udp") ? 0 : 2;
+  EXPECT_EQ(mapped_shared_memory_ports(child.pid()), expected);
   child.tell("quit");
   EXPECT_EQ(child.wait(), 0);
 }
