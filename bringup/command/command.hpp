@@ -44,6 +44,7 @@ void add_bag(CLI::App& app, const CommonOptions& common, Action& action);
 void add_calibrate(CLI::App& app, Action& action);
 void add_evaluate(CLI::App& app, Action& action);
 void add_import(CLI::App& app, Action& action);
+void add_inspect(CLI::App& app, Action& action);
 void add_report(CLI::App& app, Action& action);
 void add_simulate(CLI::App& app, Action& action);
 void add_version(CLI::App& app, Action& action);

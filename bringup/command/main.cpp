@@ -44,6 +44,7 @@ int main(int argc, char** argv) {
   camvox::command::add_calibrate(app, action);
   camvox::command::add_evaluate(app, action);
   camvox::command::add_import(app, action);
+  camvox::command::add_inspect(app, action);
   camvox::command::add_report(app, action);
   camvox::command::add_simulate(app, action);
   camvox::command::add_version(app, action);
