@@ -7,6 +7,7 @@
 #include <map>
 #include <sstream>
 #include <stdexcept>
+#include <utility>
 
 #include "camvox/storage/qos_profile.hpp"
 
@@ -15,6 +16,8 @@ namespace {
 
 constexpr std::int64_t kSecond_ns = 1'000'000'000;
 constexpr int kQueuedMessages = 4096;
+/// How often in a row topics must be found connected, as the other side may see it a little later.
+constexpr int kLooksConnected = 3;
 
 std::string remapped(const std::string& topic, const std::vector<std::string>& rules) {
   for (const auto& rule : rules) {
@@ -144,6 +147,7 @@ void ReplayComponent::start() {
   options.as_fast_as_possible = config_.lockstep;
   options.loop = config_.loop;
   options.start_offset_s = config_.start_offset_s;
+  if (config_.duration_s > 0.0) options.duration_s = config_.duration_s;
   options.start_paused = config_.paused;
   options.topics = played_topics(**bag, config_);
   options.read_ahead_bytes = static_cast<std::size_t>(config_.read_ahead_mb) << 20;
@@ -165,7 +169,30 @@ void ReplayComponent::start() {
                      clock_.publish(std::move(clock));
                    });
   }
-  context_.every(std::chrono::milliseconds(200), [this] { report(); });
+  context_.every(std::chrono::milliseconds(200), [this] {
+    if (playing_) report();
+    play_when_connected();
+  });
+  play_when_connected();
+}
+
+void ReplayComponent::play_when_connected() {
+  if (playing_) return;
+  const auto found =
+      config_.wait_for_topics.empty() ? std::vector<TopicDescription>{} : context_.topics();
+  for (const auto& name : config_.wait_for_topics) {
+    const bool connected = std::any_of(found.begin(), found.end(), [&name](const auto& topic) {
+      return topic.name == name && topic.publishers > 0 && topic.subscribers > 0;
+    });
+    if (connected) continue;
+    if (!std::exchange(wait_reported_, true)) {
+      context_.log().info("waits for the other side of {}", name);
+    }
+    looks_connected_ = 0;
+    return;
+  }
+  if (!config_.wait_for_topics.empty() && ++looks_connected_ < kLooksConnected) return;
+  playing_ = true;
   player_->start();
 }
 

@@ -158,6 +158,33 @@ TEST(ReplayComponent, OverridesOfQosWin) {
   EXPECT_THAT(replay.best_effort_topics(), ::testing::ElementsAre("/b"));
 }
 
+TEST(ReplayComponent, WaitsForTheOtherSideOfTopics) {
+  const TemporaryFolder folder;
+  recording::write_bag(folder.file("bag"), {{"/a", 0.0, 7}});
+  FakeContext fake;
+  fake.set_parameter("bag", folder.file("bag"));
+  fake.set_parameter("wait_for_topics", std::vector<std::string>{"/map"});
+  fake.set_topics({{"/map", "type", {}, 1, 0}});
+  ReplayComponent replay(fake);
+  replay.start();
+  fake.advance(std::chrono::seconds(2));
+  EXPECT_TRUE(logged(fake, "waits for the other side of /map"));
+  EXPECT_FALSE(fake.diagnostics().status().values.contains("sent"));
+  fake.set_topics({{"/map", "type", {}, 1, 1}});
+  EXPECT_TRUE(run_until(fake, [&] { return logged(fake, "1 messages sent"); }));
+}
+
+TEST(ReplayComponent, EndsAfterTheGivenDuration) {
+  const TemporaryFolder folder;
+  recording::write_bag(folder.file("bag"), {{"/a", 0.0, 7}, {"/a", 0.05, 8}, {"/a", 0.5, 9}});
+  FakeContext fake;
+  fake.set_parameter("bag", folder.file("bag"));
+  fake.set_parameter("duration_s", 0.1);
+  ReplayComponent replay(fake);
+  replay.start();
+  EXPECT_TRUE(run_until(fake, [&] { return logged(fake, "2 messages sent"); }));
+}
+
 TEST(ReplayComponent, MissingBagIsAClearError) {
   FakeContext fake;
   fake.set_parameter("bag", std::string("/no/such/bag"));

@@ -20,6 +20,7 @@ struct ReplayConfig {
   double rate = 1.0;            ///< Speed; 1 is that of the recording. May change while playing.
   bool loop = false;            ///< Starts again at the end.
   double start_offset_s = 0.0;  ///< Leaves out the first part.
+  double duration_s = 0.0;      ///< Ends after so much of the recording; 0: with it.
   bool paused = false;          ///< Sends nothing. May change while playing.
   std::vector<std::string> topics;  ///< Only these; empty: all.
   std::vector<std::string> remap;   ///< "from:=to" each, as `ros2 bag play --remap`.
@@ -31,6 +32,9 @@ struct ReplayConfig {
   std::string lockstep_topic = "/camera/image_raw";  ///< Or compressed: the frames.
   std::vector<std::string> lockstep_components;      ///< Who reports each frame done.
   int frames_in_flight = 2;  ///< Frames sent before the first of them must be done.
+  /// Starts when each of these topics has a publisher and a subscriber, one of them in another
+  /// process: a back end that is not there yet would miss the first frames.
+  std::vector<std::string> wait_for_topics;
   bool exit_at_end = false;  ///< Ends the container when the recording is over.
   double settle_s = 2.0;     ///< How long nothing must be reported done before that.
 
@@ -40,6 +44,7 @@ struct ReplayConfig {
     field("rate", self.rate, config::greater_than(0.0));
     field("loop", self.loop);
     field("start_offset_s", self.start_offset_s, config::at_least(0.0));
+    field("duration_s", self.duration_s, config::at_least(0.0));
     field("paused", self.paused);
     field("topics", self.topics);
     field("remap", self.remap);
@@ -51,6 +56,7 @@ struct ReplayConfig {
     field("lockstep_topic", self.lockstep_topic);
     field("lockstep_components", self.lockstep_components);
     field("frames_in_flight", self.frames_in_flight, config::at_least(1));
+    field("wait_for_topics", self.wait_for_topics);
     field("exit_at_end", self.exit_at_end);
     field("settle_s", self.settle_s, config::at_least(0.0), config::at_most(3600.0));
   }
@@ -77,6 +83,7 @@ class ReplayComponent final : public Component {
   void change(const ReplayConfig& config);
   void advertise_topics(const storage::BagReader& bag);
   void send(recording::PlayedMessage&& message);
+  void play_when_connected();
   void report();
   void report_end(const recording::PlayerState& state);
 
@@ -88,6 +95,9 @@ class ReplayComponent final : public Component {
   std::vector<bool> is_frame_;                     // same
   std::vector<std::string> best_effort_topics_;
   std::unique_ptr<recording::Player> player_;
+  bool playing_ = false;
+  bool wait_reported_ = false;
+  int looks_connected_ = 0;  // in a row at which all of wait_for_topics were connected
   bool end_reported_ = false;
   std::int64_t last_activity_ns_ = 0;  // when the end was reached, or a frame reported done
 };

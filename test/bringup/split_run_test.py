@@ -1,0 +1,69 @@
+#!/usr/bin/python3
+"""Front end and back end in two containers do what one container does. Usage: CAMVOX TEST..."""
+import fcntl
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+sys.path.insert(0, str(pathlib.Path(__file__).parent))
+from split_run import Runs, TwoHosts, states  # noqa: E402
+
+CAMVOX = sys.argv.pop(1)
+
+
+class SplitRun(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls._folder = tempfile.TemporaryDirectory(prefix="split_run_")
+        work = pathlib.Path(cls._folder.name)
+        subprocess.run([CAMVOX, "simulate", "demo", "--set", "duration_s=4.0", "-o",
+                        str(work / "recording")], check=True, stdout=subprocess.DEVNULL)
+        cls.runs = Runs(work / "recording", work, CAMVOX)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls._folder.cleanup()
+
+    def expect_same(self, one, outputs):
+        for output in outputs:
+            for name in ("trajectory.tum", "keyframes.tum"):
+                self.assertEqual((one / name).read_bytes(), (output / name).read_bytes(),
+                                 f"{output / name}: differs from that of one container")
+
+    def test_lockstep_gives_the_same_bytes(self):
+        one = self.runs.one("one", ["--lockstep"])
+        self.assertGreater(states(one).get("ok", 0), 30)
+        with self.subTest("two processes"):
+            self.expect_same(one, self.runs.split("processes", ["--lockstep"]))
+        with self.subTest("two hosts"):
+            self.expect_same(one, self.runs.split("hosts", ["--lockstep"], self.two_hosts()))
+
+    def two_hosts(self):
+        try:
+            hosts = TwoHosts()
+        except OSError as error:
+            self.skipTest(str(error))
+        self.addCleanup(hosts.close)
+        return hosts
+
+
+def reserve_domain():
+    """A DDS domain of our own until we end; the same locks as test/support/dds_domain.cpp."""
+    for domain in range(20, 100):
+        lock = open(pathlib.Path(tempfile.gettempdir()) / f"camvox_test_domain_{domain}.lock", "w")
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            lock.close()
+            continue
+        os.environ["ROS_DOMAIN_ID"] = str(domain)
+        return lock
+    raise RuntimeError("no free DDS domain for this test")
+
+
+if __name__ == "__main__":
+    domain_lock = reserve_domain()
+    unittest.main(verbosity=2)
