@@ -32,6 +32,7 @@ inline constexpr std::string_view kCloud = "/camvox/cloud";
 inline constexpr std::string_view kDepthImage = "/camvox/depth_image";
 inline constexpr std::string_view kFramePose = "/camvox/frame_pose";
 inline constexpr std::string_view kKeyframe = "/camvox/keyframe";
+inline constexpr std::string_view kResentKeyframe = "/camvox/resent_keyframe";
 inline constexpr std::string_view kMapKeyframe = "/camvox/map_keyframe";
 inline constexpr std::string_view kLocalMap = "/camvox/local_map";
 inline constexpr std::string_view kMapUpdate = "/camvox/map_update";
