@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cstring>
 #include <filesystem>
 
 #include "camvox/conversion/header.hpp"
 #include "camvox/conversion/image.hpp"
+#include "camvox/conversion/point_cloud.hpp"
 #include "camvox/conversion/pose.hpp"
 #include "cloud_file.hpp"
 
@@ -14,38 +14,10 @@ namespace camvox {
 namespace {
 
 using sensor_msgs::msg::PointCloud2;
-using sensor_msgs::msg::PointField;
 
 /// Frames whose images wait for the news that they are a keyframe: as long as tracking may take.
 constexpr std::size_t kFramesKept = 8;
 constexpr std::size_t kMaxOpen = 64;
-constexpr std::uint32_t kPointBytes = 16;  // x y z as float, rgb packed into one
-
-void write_points(const std::vector<dense::ColouredPoint>& points, PointCloud2& cloud) {
-  const char* names[] = {"x", "y", "z", "rgb"};
-  for (std::uint32_t i = 0; i < 4; ++i) {
-    PointField field;
-    field.name(names[i]);
-    field.offset(4 * i);
-    field.datatype(7);  // FLOAT32
-    field.count(1);
-    cloud.fields().push_back(field);
-  }
-  cloud.height(1);
-  cloud.width(static_cast<std::uint32_t>(points.size()));
-  cloud.point_step(kPointBytes);
-  cloud.row_step(kPointBytes * cloud.width());
-  cloud.is_dense(true);
-  cloud.data().resize(kPointBytes * points.size());
-  auto* out = cloud.data().data();
-  for (const auto& [p, rgb] : points) {
-    const std::uint32_t packed =
-        (std::uint32_t{rgb[0]} << 16) | (std::uint32_t{rgb[1]} << 8) | rgb[2];
-    std::memcpy(out, p.data(), 12);
-    std::memcpy(out + 12, &packed, 4);
-    out += kPointBytes;
-  }
-}
 
 }  // namespace
 
@@ -156,7 +128,7 @@ void DenseMapComponent::publish() {
   if (cloud_.subscriber_count() == 0 || map_.size() == 0) return;
   auto cloud = cloud_.loan();
   cloud->header(conversion::to_header(context_.now_ns(), "map"));
-  write_points(map_.points(), *cloud);
+  conversion::write_points(map_.points(), *cloud);
   cloud_.publish(std::move(cloud));
 }
 

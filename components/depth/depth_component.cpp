@@ -31,7 +31,8 @@ DepthComponent::DepthComponent(Context& context)
                                                   {.qos = qos::kFrames})),
       metres_(context.advertise<Image>(kMetres, {.qos = qos::kSensorWriter})),
       millimetres_(context.advertise<Image>(kMillimetres, {.qos = qos::kSensorWriter})),
-      camera_info_(context.advertise<CameraInfo>(kCameraInfo, {.qos = qos::kSensorWriter})) {
+      camera_info_(context.advertise<CameraInfo>(kCameraInfo, {.qos = qos::kSensorWriter})),
+      coloured_cloud_(context, config_.camera) {
   const auto pixels = std::int64_t{config_.camera.width_px} * config_.camera.height_px;
   if (pixels > camvox_interfaces::msg::DEPTH_PIXELS) {
     throw config::ConfigError({{{}, "camera", "more pixels than a depth image can hold"}});
@@ -76,6 +77,7 @@ void DepthComponent::on_cloud(const Cloud& cloud) {
     context_.diagnostics().set("pixels with depth", report.filled_px);
   }
   publish_edge_topics(*depth);
+  coloured_cloud_.add(cloud, *depth, T_camera_lidar_);
   depth_images_.publish(std::move(depth));
   progress_.done(cloud.header());
 }

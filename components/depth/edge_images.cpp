@@ -11,7 +11,6 @@ namespace {
 using camvox_interfaces::msg::DepthImage;
 using sensor_msgs::msg::Image;
 
-constexpr auto kCameraFrame = "camera_optical_frame";
 constexpr float kMaxMillimetres = 65535.0F;
 
 std_msgs::msg::Header header_of(const DepthImage& depth) {

@@ -13,9 +13,11 @@ namespace {
 using camvox_interfaces::msg::Cloud;
 using camvox_interfaces::msg::DepthImage;
 using camvox_interfaces::msg::Extrinsics;
+using camvox_interfaces::msg::FrameImage;
 using camvox_interfaces::msg::Progress;
 using sensor_msgs::msg::CameraInfo;
 using sensor_msgs::msg::Image;
+using sensor_msgs::msg::PointCloud2;
 
 constexpr int kWidth = 160;
 constexpr int kHeight = 120;
@@ -34,7 +36,7 @@ class DepthTest : public testing::Test {
   }
 
   void set_readers(std::size_t count) {
-    for (const auto* topic : {"depth", "depth_mm", "camera_info"}) {
+    for (const auto* topic : {"depth", "depth_mm", "camera_info", "coloured_cloud"}) {
       fake_.set_subscriber_count(topic, count);
     }
   }
@@ -52,6 +54,22 @@ class DepthTest : public testing::Test {
         }
       }
       cloud.points_count(count);
+    });
+  }
+
+  /// RGB 10 20 30 in the left half, 110 120 130 in the right one.
+  void send_image(std::uint64_t frame_id) {
+    fake_.send<FrameImage>("frame_image", [&](FrameImage& image) {
+      image.header().frame_id(frame_id);
+      image.width_px(kWidth);
+      image.height_px(kHeight);
+      image.row_step_bytes(3 * kWidth);
+      image.encoding(camvox_interfaces::msg::ENCODING_RGB8);
+      image.data_count(3 * kWidth * kHeight);
+      for (std::uint32_t i = 0; i < image.data_count(); ++i) {
+        const auto base = i % (3 * kWidth) < 3 * kWidth / 2 ? 10U : 110U;
+        image.data()[i] = static_cast<std::uint8_t>(base + 10 * (i % 3));
+      }
     });
   }
 
@@ -140,6 +158,62 @@ TEST_F(DepthTest, EdgeTopicsAreSentWhileSomebodyReadsThem) {
   EXPECT_EQ(value_m, centre_m(*depth));
   EXPECT_NEAR(value_mm, 1e3F * value_m, 0.51F);
   EXPECT_EQ(fake_.published<CameraInfo>("camera_info").at(0)->k()[0], 150.0);
+}
+
+TEST_F(DepthTest, ColouredCloudIsSentWhileSomebodyReadsIt) {
+  DepthComponent component(fake_);
+  set_readers(0);
+  send_image(1);
+  send_wall(1, 10.0F);
+  EXPECT_TRUE(fake_.published<PointCloud2>("coloured_cloud").empty());
+  set_readers(1);
+  send_image(2);
+  send_wall(2, 10.0F);
+  send_wall(3, 10.0F);
+  EXPECT_EQ(fake_.published<PointCloud2>("coloured_cloud").size(), 1U) << "waits for image 3";
+  send_image(3);
+  const auto clouds = fake_.published<PointCloud2>("coloured_cloud");
+  ASSERT_EQ(clouds.size(), 2U);
+  const auto& cloud = *clouds[1];
+  EXPECT_EQ(cloud.header().stamp().sec(), 3);
+  EXPECT_EQ(cloud.header().frame_id(), "camera_optical_frame");
+  ASSERT_EQ(cloud.fields().size(), 4U);
+  EXPECT_EQ(cloud.fields()[3].name(), "rgb");
+  ASSERT_EQ(cloud.data().size(), std::size_t{cloud.width()} * cloud.point_step());
+  // Columns from -0.53 to 0.53 rad and rows from -0.4 to 0.4 are in view, at steps of 0.01.
+  EXPECT_NEAR(cloud.width(), 106 * 80, 400);
+  for (std::uint32_t i = 0; i < cloud.width(); ++i) {
+    const auto* row = cloud.data().data() + std::size_t{i} * cloud.point_step();
+    float p[3];
+    std::uint32_t rgb = 0;
+    std::memcpy(p, row, 12);
+    std::memcpy(&rgb, row + 12, 4);
+    EXPECT_NEAR(p[2], 10.0F, 1e-4F) << "z is forward";
+    if (std::abs(p[0]) < 0.1F) continue;  // beside the border of the two colours
+    EXPECT_EQ(rgb, p[0] < 0.0F ? 0x0A141EU : 0x6E7882U) << p[0];
+  }
+}
+
+TEST_F(DepthTest, ColouredCloudLeavesOutWhatANearerSurfaceHides) {
+  DepthComponent component(fake_);
+  const auto send_near_wall_and_one_behind = [&](bool with_one) {
+    send_image(1);
+    fake_.send<Cloud>("cloud", [&](Cloud& cloud) {
+      cloud.header().frame_id(1);
+      std::uint32_t count = 0;
+      for (int i = -60; i <= 60; ++i) {
+        for (int k = -50; k <= 50; ++k) {
+          cloud.points()[count++] = {
+              5.0F, 0.05F * static_cast<float>(i), 0.05F * static_cast<float>(k), 9.0F};
+        }
+      }
+      if (with_one) cloud.points()[count++] = {20.0F, 0.5F, 0.5F, 9.0F};
+      cloud.points_count(count);
+    });
+    return fake_.published<PointCloud2>("coloured_cloud").back()->width();
+  };
+  const auto without = send_near_wall_and_one_behind(false);
+  EXPECT_EQ(send_near_wall_and_one_behind(true), without);
 }
 
 TEST_F(DepthTest, ACameraThatDoesNotFitIsRefused) {

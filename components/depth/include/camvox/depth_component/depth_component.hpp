@@ -6,6 +6,7 @@
 #include "camvox/component/component.hpp"
 #include "camvox/component/progress.hpp"
 #include "camvox/depth/depth_projector.hpp"
+#include "camvox/depth_component/coloured_cloud.hpp"
 #include "camvox/interfaces/camvox_interfaces.hpp"
 #include "camvox/interfaces/sensor_msgs.hpp"
 #include "camvox/sensors/rig.hpp"
@@ -29,7 +30,7 @@ struct DepthComponentConfig {
 /// Projects each cloud into a depth image, straight into the memory that tracking reads. New
 /// extrinsics that passed their gate take effect with the next cloud; each image carries their
 /// version. While somebody reads them there are edge topics too: the depth as 32FC1 (m) and 16UC1
-/// (mm), with its CameraInfo.
+/// (mm), with its CameraInfo, and the scan as a coloured cloud.
 class DepthComponent final : public Component {
  public:
   explicit DepthComponent(Context& context);
@@ -55,6 +56,7 @@ class DepthComponent final : public Component {
   Publisher<Image> metres_;
   Publisher<Image> millimetres_;
   Publisher<CameraInfo> camera_info_;
+  depth_component::ColouredCloudOutput coloured_cloud_;
 };
 
 }  // namespace camvox
