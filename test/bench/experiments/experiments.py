@@ -4,6 +4,7 @@
   experiments.py close-depth demo    matches and map points at close_depth_m 20, 50, 90, 130
   experiments.py accuracy demo ...   trajectory errors, one row a recording
   experiments.py timing demo         processor time of each component beside the paper's
+  experiments.py yardstick loop_400m tracking and mapping as ratios to cv::ORB on such images
   experiments.py repeat demo         ten lockstep runs, compared byte for byte
 
 A recording is a folder with a bag, its rig.yaml and truth_body.tum, or the name of one of
@@ -160,6 +161,34 @@ def timing(arguments, folder):
     table(("component", "times", "median", "p99", "max", "paper"), rows)
 
 
+def orb_ms(images):
+    """Median time of cv::ORB's detectAndCompute on one thread for one of extraction_bench's sets."""
+    bench = ROOT / "build/camvox_test/bench/features/extraction_bench"
+    if not bench.is_file():
+        raise Failed(f"{bench} is not built: bringup/build")
+    done = subprocess.run([bench, "2"], capture_output=True, text=True, check=True)
+    line = re.search(rf"^{re.escape(images)} .*?\].*?([\d.]+) \[", done.stdout, re.MULTILINE)
+    if not line:
+        raise Failed(f"{bench}: no images named {images}")
+    return float(line.group(1))
+
+
+def yardstick(arguments, folder):
+    """The run stands between two measurements of the yardstick on the same machine."""
+    bag = recording(arguments.recordings[0])
+    before_ms = orb_ms(arguments.images)
+    out = run(arguments, bag, folder / bag.name)
+    after_ms = orb_ms(arguments.images)
+    orb, rows = (before_ms + after_ms) / 2, []
+    tracking = sorted(float(row["time_ms"]) for row in rows_of(out / "frames.csv")[1:])
+    for name, value in (("tracking, median", tracking[len(tracking) // 2]),
+                        ("tracking, p99", tracking[len(tracking) * 99 // 100])):
+        rows.append((name, f"{value:.2f}", f"{value / orb:.2f}"))
+    rows.append(("cv::ORB before and after", f"{before_ms:.2f}, {after_ms:.2f}", "1"))
+    print(f"Processor time, {bag.name}; yardstick on {arguments.images}\n")
+    table(("what", "ms", "ratio"), rows)
+
+
 def digests(out, files):
     return {name: hashlib.sha256((out / name).read_bytes()).hexdigest() for name in files}
 
@@ -182,13 +211,16 @@ def repeat(arguments, folder):
 
 def main():
     commands = {"close-depth": (close_depth, ["demo"]), "accuracy": (accuracy, list(PRESETS[:5])),
-                "timing": (timing, ["demo"]), "repeat": (repeat, ["demo"])}
+                "timing": (timing, ["demo"]), "yardstick": (yardstick, ["loop_400m"]),
+                "repeat": (repeat, ["demo"])}
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("experiment", choices=commands)
     parser.add_argument("recordings", nargs="*", help="folders or names of presets")
     parser.add_argument("--config", default="replay.yaml", help="a file in config/")
     parser.add_argument("--runs", type=int, default=10, help="of repeat")
+    parser.add_argument("--images", default="synthetic 1520x568",
+                        help="of yardstick: a line of extraction_bench")
     parser.add_argument("--domain", type=int, default=96, help="ROS_DOMAIN_ID of the runs")
     parser.add_argument("--keep", type=pathlib.Path, help="folder for what the runs leave")
     arguments = parser.parse_args()
