@@ -30,7 +30,7 @@ struct ParticipantOptions {
   int domain_id = 0;
   Network network = Network::kLocalhost;
   bool shared_memory = true;  ///< Use shared memory towards other processes of this machine.
-  bool udp = true;  ///< Send messages over UDP. Discovery goes over UDP in any case.
+  bool udp = true;            ///< Send messages over UDP. Discovery goes over UDP in any case.
   std::size_t shared_memory_segment_bytes = std::size_t{64} << 20;
   std::vector<std::string> peers;  ///< More hosts to look for (IPv4), with kSubnet.
 };
