@@ -18,7 +18,7 @@ using geometry::SE3;
 using geometry::SO3;
 
 constexpr double kNsToS = 1e-9;
-constexpr float kLidarSigma_m = 0.03F;
+constexpr float kPlainSigma_m = 0.03F;
 
 template <typename Stamp>
 std::int64_t to_ns(const Stamp& stamp) {
@@ -203,12 +203,28 @@ void DepthSource::from_depth_image(const cv::Mat& depth_mm) {
 }
 
 void DepthSource::from_sweep(const Sweep& sweep, const geometry::Vector6d& twist_camera) {
-  const auto& camera = recording_.intrinsics;
   const SE3 T_camera_lidar = recording_.T_body_camera.inverse() * recording_.T_body_lidar;
+  const geometry::Vector6d twist_lidar = T_camera_lidar.inverse().adjoint() * twist_camera;
+  points_lidar_.clear();
   for (std::size_t i = 0; i < sweep.points_lidar.size(); ++i) {
-    const SE3 T_image_then = SE3::exp(twist_camera * static_cast<double>(sweep.after_image_s[i]));
-    const Eigen::Vector3d p_camera =
-        T_image_then * (T_camera_lidar * sweep.points_lidar[i].cast<double>());
+    const SE3 T_image_then = SE3::exp(twist_lidar * static_cast<double>(sweep.after_image_s[i]));
+    const Eigen::Vector3f p_lidar =
+        (T_image_then * sweep.points_lidar[i].cast<double>()).cast<float>();
+    points_lidar_.insert(points_lidar_.end(), {p_lidar.x(), p_lidar.y(), p_lidar.z(), 0.0F});
+  }
+  const depth::ScanView scan{points_lidar_, T_camera_lidar};
+  if (plain_) {
+    project_plainly(scan);
+  } else {
+    static_cast<void>(projector_.project({&scan, 1}, depth_m_, sigma_m_));
+  }
+}
+
+void DepthSource::project_plainly(const depth::ScanView& scan) {
+  const auto& camera = recording_.intrinsics;
+  for (std::size_t i = 0; i < scan.points_lidar.size(); i += 4) {
+    const Eigen::Vector3f p_lidar(&scan.points_lidar[i]);
+    const Eigen::Vector3d p_camera = scan.T_camera_lidar * p_lidar.cast<double>();
     if (p_camera.z() < 0.5) continue;
     const long u = std::lround(camera.fx_px * p_camera.x() / p_camera.z() + camera.cx_px);
     const long v = std::lround(camera.fy_px * p_camera.y() / p_camera.z() + camera.cy_px);
@@ -217,7 +233,7 @@ void DepthSource::from_sweep(const Sweep& sweep, const geometry::Vector6d& twist
     const auto z_m = static_cast<float>(p_camera.z());
     if (depth_m_[pixel] > 0.0F && depth_m_[pixel] <= z_m) continue;
     depth_m_[pixel] = z_m;
-    sigma_m_[pixel] = kLidarSigma_m;
+    sigma_m_[pixel] = kPlainSigma_m;
   }
 }
 

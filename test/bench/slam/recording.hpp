@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "camvox/depth/depth_projector.hpp"
 #include "camvox/depth/sample_depth.hpp"
 #include "camvox/geometry/se3.hpp"
 #include "camvox/sensors/camera_intrinsics.hpp"
@@ -43,19 +44,27 @@ struct Recording {
 /// Depth aligned with the image; keeps its memory from frame to frame.
 class DepthSource {
  public:
-  explicit DepthSource(const Recording& recording) : recording_(recording) {}
+  /// `plain`: the nearest return of each pixel instead of the depth library's projection, to tell
+  /// errors of the two from those of tracking.
+  DepthSource(const Recording& recording, bool plain)
+      : recording_(recording),
+        plain_(plain),
+        projector_(sensors::CameraModel(recording.intrinsics), {}) {}
 
   /// Of a depth camera, with a Kinect's sigma (Nguyen et al., 3DIMPVT 2012); or of the sweep,
-  /// moved to the image's time by the twist of the camera [rotation; translation] and projected,
-  /// nearest return first.
+  /// moved to the image's time by the twist of the camera [rotation; translation] and projected.
   [[nodiscard]] depth::DepthView depth_of(const RecordedFrame& frame,
                                           const geometry::Vector6d& twist_camera);
 
  private:
   void from_depth_image(const cv::Mat& depth_mm);
   void from_sweep(const Sweep& sweep, const geometry::Vector6d& twist_camera);
+  void project_plainly(const depth::ScanView& scan);
 
   const Recording& recording_;
+  bool plain_;
+  depth::DepthProjector projector_;
+  std::vector<float> points_lidar_;  ///< x y z 0 of each return.
   std::vector<float> depth_m_;
   std::vector<float> sigma_m_;
 };

@@ -31,6 +31,8 @@ struct Options {
   tracking::TrackerConfig tracker;
   mapping::MappingConfig mapping;
   bool without_mapping = false;
+  bool plain_depth = false;
+  int depth_radius_px = tracking::FrameBuilderConfig().depth_radius_px;
   bool verbose = false;
 };
 
@@ -115,7 +117,7 @@ class Run {
         tracker_(options.tracker, builder_.tracking_camera(), recording.T_body_camera),
         founded_(builder_.tracking_camera()),
         mapper_(options.mapping, builder_.tracking_camera()),
-        depth_source_(recording),
+        depth_source_(recording, options.plain_depth),
         orb_(cv::ORB::create(options.features)) {}
 
   void process(std::size_t number);
@@ -125,6 +127,7 @@ class Run {
   static tracking::FrameBuilderConfig builder_config(const Options& options) {
     tracking::FrameBuilderConfig config;
     config.extractor.features = options.features;
+    config.depth_radius_px = options.depth_radius_px;
     return config;
   }
   void insert(const tracking::Keyframe& keyframe, tracking::KeyframeId reference);
@@ -261,6 +264,8 @@ int main(int argc, char** argv) {
   app.add_option("--depth-model", options.tracker.depth_model, "metric or virtual_stereo");
   app.add_option("--sigma-px", options.tracker.sigma_px);
   app.add_flag("--without-mapping", options.without_mapping, "landmarks stay as founded");
+  app.add_flag("--plain-depth", options.plain_depth, "lidar returns without fill and occlusion");
+  app.add_option("--depth-radius-px", options.depth_radius_px);
   app.add_flag("--verbose", options.verbose);
   CLI11_PARSE(app, argc, argv);
   cv::setNumThreads(1);
