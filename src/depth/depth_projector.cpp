@@ -33,7 +33,8 @@ ProjectionBounds make_bounds(const DepthProjectorConfig& config) {
 
 MixedCellRule make_rule(const DepthProjectorConfig& config) {
   return {static_cast<float>(config.fill_reach_px),
-          static_cast<float>(config.edge_margin_px),
+          static_cast<float>(config.near_margin_px),
+          static_cast<float>(config.far_margin_px),
           static_cast<float>(config.surface_gap),
           static_cast<float>(config.max_roughness)};
 }
@@ -161,6 +162,7 @@ ProjectionReport DepthProjector::project(std::span<const ScanView> scans,
   const OcclusionRule rule{.surface_gap = static_cast<float>(self.config.surface_gap)};
   report.hidden = hide_returns(self.planes, rule, self.grid);
   if (report.hidden > 0) self.planes.fit(self.grid, self.noise);
+  self.planes.drop_unsupported(self.grid);
   report.filled_px = self.write(depth_m, sigma_m);
   return report;
 }

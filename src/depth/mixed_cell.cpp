@@ -25,10 +25,14 @@ constexpr float kInlierSigmas = 3.5F;
 constexpr float kPlaneTolerance = 0.004F;
 /// A surface may go on this far beyond its outermost returns.
 constexpr float kBeyond_px = 1.5F;
-/// A return without a surface stands for itself this far.
+/// A return alone at its depth stands for itself this far.
 constexpr float kLoneReach_px = 1.5F;
-/// Slope of a lone return's surface, as that of an incidence of 63 degrees.
+/// Slope of its surface, as that of an incidence of 63 degrees.
 constexpr float kLoneSlope = 2.0F;
+/// Of a surface that gives no depth.
+constexpr float kNoReach_px = -1.0F;
+/// Relief between a pixel and the nearest return, per pixel, as a share of inverse depth.
+constexpr float kReliefPerPixel = 0.0001F;
 
 float squared(float x) { return x * x; }
 
@@ -40,6 +44,8 @@ struct MixedCellFiller::Nearest {
   Distances second2;
   Distances rho;  ///< Inverse depth of the nearest surface; 0: it must not have one here.
   Distances sigma_rho;
+  Distances best_rho;  ///< The same, also where it must not have one.
+  Distances second_rho;
 };
 
 float MixedCellFiller::noise_sigma(float rho, float slope2) const {
@@ -144,26 +150,23 @@ void MixedCellFiller::split_by_gaps(std::size_t begin) {
   }
 }
 
-/// A cluster of returns of about one depth is a surface if a plane fits, else each is one.
+/// A cluster of returns of about one depth: without a plane through it, several only compete.
 void MixedCellFiller::add_cluster(std::size_t begin, std::size_t end) {
   if (end - begin >= kLeastForPlane) {
     const std::size_t before = surfaces_.size();
     add_surface(begin, end, nullptr);
     if (surfaces_.size() > before) return;
   }
-  for (std::size_t i = begin; i < end; ++i) {
-    const float rho = sorted_[i].rho;
-    const float slope = kLoneSlope * rho / static_cast<float>(noise_.focal_px);
-    const float sigma = std::hypot(noise_sigma(rho, slope * slope), slope * kLoneReach_px);
-    add_octagon({i, i + 1, {rho, 0.0F, 0.0F, sigma}, kLoneReach_px, {}, {}});
-  }
+  const float rho = sorted_[begin].rho;
+  const float slope = kLoneSlope * rho / static_cast<float>(noise_.focal_px);
+  const float sigma = std::hypot(noise_sigma(rho, slope * slope), slope * kLoneReach_px);
+  const float reach_px = end - begin == 1 ? kLoneReach_px : kNoReach_px;
+  add_octagon({begin, end, {rho, 0.0F, 0.0F, sigma}, reach_px, {}, {}});
 }
 
 void MixedCellFiller::add_surface(std::size_t begin, std::size_t end, const CellPlane* known) {
   if (known != nullptr && end - begin < kLeastForPlane) {
-    CellPlane plane = *known;
-    plane.sigma_rho *= 1.5F;
-    add_octagon({begin, end, plane, reach_px_, {}, {}});
+    add_octagon({begin, end, *known, kNoReach_px, {}, {}});
     return;
   }
   CellGrid::Moments m{};
@@ -231,7 +234,7 @@ void MixedCellFiller::measure(const Surface& surface, Distances& distances) cons
 CAMVOX_TARGET_CLONES
 void MixedCellFiller::merge(const Surface& surface, const Distances& distances, Nearest& nearest) {
   const CellPlane plane = surface.plane;
-  const float reach2 = surface.reach_px * surface.reach_px;
+  const float reach2 = surface.reach_px * std::abs(surface.reach_px);
   const std::array<float, 4> low = surface.low;
   const std::array<float, 4> high = surface.high;
   for (int v = 0; v < kCell; ++v) {
@@ -254,6 +257,11 @@ void MixedCellFiller::merge(const Surface& surface, const Distances& distances, 
       const float loser = nearer ? best2 : d2;
       nearest.best2[static_cast<std::size_t>(px)] = nearer ? d2 : best2;
       nearest.second2[static_cast<std::size_t>(px)] = loser < second2 ? loser : second2;
+      float& best_rho = nearest.best_rho[static_cast<std::size_t>(px)];
+      const float loser_rho = nearer ? best_rho : rho;
+      best_rho = nearer ? rho : best_rho;
+      float& second_rho = nearest.second_rho[static_cast<std::size_t>(px)];
+      second_rho = loser < second2 ? loser_rho : second_rho;
       const float offered = valid != 0 ? rho : 0.0F;
       float& kept = nearest.rho[static_cast<std::size_t>(px)];
       kept = nearer ? offered : kept;
@@ -266,14 +274,18 @@ void MixedCellFiller::merge(const Surface& surface, const Distances& distances, 
 /// Pixels about as near to a second surface stay empty.
 CAMVOX_TARGET_CLONES
 void MixedCellFiller::decide(const Nearest& nearest, CellPixels& pixels) const {
-  const float band = 2.0F * rule_.edge_margin_px;
+  const float near_band = 2.0F * rule_.near_margin_px;
+  const float far_band = 2.0F * rule_.far_margin_px;
   for (std::size_t px = 0; px < kPixels; ++px) {
     const float rho = nearest.rho[px];
+    const float band = nearest.second_rho[px] > nearest.best_rho[px] ? far_band : near_band;
     const bool clear = std::sqrt(nearest.second2[px]) - std::sqrt(nearest.best2[px]) >= band;
     const bool filled = clear & (rho > 0.0F);
     const float z = 1.0F / (rho > 0.0F ? rho : 1.0F);
+    const float variance =
+        squared(nearest.sigma_rho[px]) + squared(kReliefPerPixel * rho) * nearest.best2[px];
     pixels.depth_m[px] = filled ? z : 0.0F;
-    pixels.sigma_m[px] = filled ? nearest.sigma_rho[px] * z * z : 0.0F;
+    pixels.sigma_m[px] = filled ? std::sqrt(variance) * z * z : 0.0F;
   }
 }
 
@@ -294,6 +306,8 @@ void MixedCellFiller::fill(
   nearest.second2.fill(std::numeric_limits<float>::max());
   nearest.rho.fill(0.0F);
   nearest.sigma_rho.fill(0.0F);
+  nearest.best_rho.fill(0.0F);
+  nearest.second_rho.fill(0.0F);
   Distances distances;
   for (const Surface& surface : surfaces_) {
     measure(surface, distances);

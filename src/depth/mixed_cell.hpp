@@ -12,7 +12,8 @@ namespace camvox::depth {
 /// How the pixels of a cell with several surfaces, or few returns, are filled.
 struct MixedCellRule {
   float fill_reach_px = 10.0F;
-  float edge_margin_px = 2.5F;
+  float near_margin_px = 1.0F;
+  float far_margin_px = 4.0F;
   float surface_gap = 0.03F;
   float max_roughness = 0.02F;
 };
@@ -38,12 +39,13 @@ class MixedCellFiller {
     float v_px;
     float rho;
   };
-  /// A surface: the returns begin to end of `sorted_`, and the plane through them.
+  /// A surface: the returns begin to end of `sorted_`, and the plane through them. Without a plane
+  /// it gives no depth, but keeps others away.
   struct Surface {
     std::size_t begin;
     std::size_t end;
     CellPlane plane;
-    float reach_px;
+    float reach_px;            ///< Negative: gives no depth.
     std::array<float, 4> low;  ///< The octagon around the returns: u, v, u + v, u - v.
     std::array<float, 4> high;
   };

@@ -34,8 +34,10 @@ struct PlaneFit {
 inline constexpr double kPriorReturns = 6.0;
 /// Steepest surface to expect: d rho / d px = this * rho / f (tangent of the incidence angle).
 inline constexpr double kSteepest = 20.0;
-/// Relief that the scatter of the returns does not show, as a share of their noise.
+/// Relief that the returns miss: this share of their noise with so many of them, more with fewer,
+/// less with more.
 inline constexpr double kRelief = 0.4;
+inline constexpr double kReliefReturns = 11.0;
 /// Scatter about a plane that is taken for relief, as a share of inverse depth.
 inline constexpr double kRough = 0.005;
 /// Error of direction that returns of one place have in common (the beam has a width, and the
@@ -92,8 +94,9 @@ fit_plane(const double* m, double u_c, double v_c, double cosine, const NoiseMod
   const double pointing = kPointingBias * noise.angle_sigma_px;
   const double excess = fit.sum_squares - dof * fit.noise_variance;
   const double structure = excess > 0.0 ? excess * inverse_n : 0.0;
+  const double relief = kRelief * kReliefReturns * inverse_n;
   fit.variance = scatter * (inverse_n + distance2 + over_cell) + structure +
-                 kRelief * kRelief * fit.noise_variance + along * along +
+                 relief * relief * fit.noise_variance + along * along +
                  g2 * (shift_px + pointing * pointing);
   return fit;
 }

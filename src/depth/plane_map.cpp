@@ -14,6 +14,10 @@ constexpr double kLeastReturnsAlone = 8.0;
 /// returns: returns on half of the window only have it at 1.7.
 constexpr double kMostOffCentre2 = 1.0;
 
+/// A plane cell with no, one, or more returns of its own has at most so many cells without a plane
+/// among the nine around and with it.
+constexpr std::array<int, 3> kMostMixed = {3, 4, 6};
+
 using Moment = CellGrid::Moment;
 
 bool is_plane(const PlaneFit& fit, double least) {
@@ -47,7 +51,7 @@ PlaneMap::PlaneMap(const sensors::CameraModel& camera) {
   columns_ = grid.columns();
   rows_ = grid.rows();
   const auto cells = static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_);
-  kinds_.resize(cells);
+  kinds_.resize(cells, CellKind::kMixed);
   planes_.resize(cells);
   cosines_.resize(cells, 1.0F);
   for (int row = 0; row < rows_; ++row) {
@@ -115,6 +119,25 @@ void PlaneMap::fit(const CellGrid& grid, const NoiseModel& noise) {
       planes_[cell] = fits.planes[i];
       const bool plane = fits.accepted[i] != 0 || try_cell_alone(grid, column, row, noise);
       kinds_[cell] = plane ? CellKind::kPlane : CellKind::kMixed;
+    }
+  }
+}
+
+void PlaneMap::drop_unsupported(const CellGrid& grid) {
+  kinds_before_ = kinds_;
+  for (int row = kMargin; row < rows_ - kMargin; ++row) {
+    for (int column = kMargin; column < columns_ - kMargin; ++column) {
+      const std::size_t cell = grid.cell(column, row);
+      if (kinds_before_[cell] != CellKind::kPlane) continue;
+      int mixed = 0;
+      for (int dy = -1; dy <= 1; ++dy) {
+        for (int dx = -1; dx <= 1; ++dx) {
+          const CellKind other = kinds_before_[grid.cell(column + dx, row + dy)];
+          mixed += static_cast<int>(other == CellKind::kMixed);
+        }
+      }
+      const double own = std::clamp(grid.sums(CellGrid::kN)[cell], 0.0, 2.0);
+      if (mixed > kMostMixed[static_cast<std::size_t>(own)]) kinds_[cell] = CellKind::kMixed;
     }
   }
 }

@@ -32,6 +32,11 @@ class PlaneMap {
   /// Fits all cells.
   void fit(const CellGrid& grid, const NoiseModel& noise);
 
+  /// Takes the plane from cells that stand in for a gap in the scan: few returns of their own, and
+  /// neighbours without a plane. What lies in such a gap is often nearer, and not to be seen
+  /// through.
+  void drop_unsupported(const CellGrid& grid);
+
   [[nodiscard]] CellKind kind(std::size_t cell) const { return kinds_[cell]; }
   [[nodiscard]] const CellPlane& plane(std::size_t cell) const { return planes_[cell]; }
 
@@ -51,6 +56,7 @@ class PlaneMap {
   int rows_;
   std::vector<float> cosines_;
   std::vector<CellKind> kinds_;
+  std::vector<CellKind> kinds_before_;
   std::vector<CellPlane> planes_;
 };
 

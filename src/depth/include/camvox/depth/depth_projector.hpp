@@ -12,15 +12,16 @@ namespace camvox::depth {
 
 /// Tuning of DepthProjector. YAML keys are the field names.
 struct DepthProjectorConfig {
-  double min_range_m = 0.5;            ///< Nearer returns are ignored.
-  double max_range_m = 130.0;          ///< Farther returns are ignored.
-  double range_sigma_m = 0.02;         ///< White noise of a return's range.
-  double angle_sigma_deg = 0.05;       ///< White noise of its direction, each way.
-  double extrinsics_sigma_deg = 0.01;  ///< Rotation of T_camera_lidar, per axis.
-  double extrinsics_sigma_m = 0.002;   ///< Translation of T_camera_lidar, per axis.
-  double fill_reach_px = 10.0;         ///< No pixel farther from every return is filled.
-  double edge_margin_px = 2.5;         ///< Half-width of the empty band between two surfaces.
-  double surface_gap = 0.03;           ///< Surfaces differ by more than this share of depth.
+  double min_range_m = 0.5;           ///< Nearer returns are ignored.
+  double max_range_m = 130.0;         ///< Farther returns are ignored.
+  double range_sigma_m = 0.02;        ///< White noise of a return's range.
+  double angle_sigma_deg = 0.05;      ///< White noise of its direction, each way.
+  double extrinsics_sigma_deg = 0.1;  ///< Rotation of T_camera_lidar, per axis.
+  double extrinsics_sigma_m = 0.002;  ///< Translation of T_camera_lidar, per axis.
+  double fill_reach_px = 10.0;        ///< No pixel farther from every return is filled.
+  double near_margin_px = 1.0;        ///< Empty beside an edge on the nearer surface...
+  double far_margin_px = 4.0;         ///< ...and on the one behind.
+  double surface_gap = 0.03;          ///< Surfaces differ by more than this share of depth.
   double max_roughness = 0.02;  ///< Spread about a plane, as a share of depth, that is filled.
 
   template <typename Self, typename Visitor>
@@ -36,7 +37,8 @@ struct DepthProjectorConfig {
     field(
         "extrinsics_sigma_m", self.extrinsics_sigma_m, config::at_least(0.0), config::at_most(1.0));
     field("fill_reach_px", self.fill_reach_px, config::at_least(0.0), config::at_most(16.0));
-    field("edge_margin_px", self.edge_margin_px, config::at_least(0.0), config::at_most(16.0));
+    field("near_margin_px", self.near_margin_px, config::at_least(0.0), config::at_most(16.0));
+    field("far_margin_px", self.far_margin_px, config::at_least(0.0), config::at_most(16.0));
     field("surface_gap", self.surface_gap, config::at_least(0.001), config::at_most(1.0));
     field("max_roughness", self.max_roughness, config::at_least(0.0), config::at_most(1.0));
   }
@@ -68,9 +70,10 @@ struct ProjectionReport {
 /// averaged, slopes are kept. Elsewhere the returns are sorted into surfaces (planes of
 /// neighbouring cells first, then gaps in depth), and a pixel gets the depth of the nearest
 /// return's surface, unless another surface is about as near: which of the two it shows is then not
-/// known, and it stays empty. Before that, returns that the lidar saw past an edge, but the camera
-/// cannot, are dropped: those that change sides with a return of a nearer surface between the
-/// lidar's view and the camera's.
+/// known, and it stays empty. The doubt is greater for the farther surface: the silhouette belongs
+/// to the nearer one, whose edge may stand out past its last return. Before that, returns that the
+/// lidar saw past an edge, but the camera cannot, are dropped: those that change sides with a
+/// return of a nearer surface between the lidar's view and the camera's.
 ///
 /// Sigma: scatter of the returns about the plane (prior: range noise, and angular noise times
 /// slope) through the covariance of the fit, roughness, and the uncertainty of the extrinsics.
