@@ -1,5 +1,6 @@
 #include "camvox/depth_component/depth_component.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -12,6 +13,8 @@ namespace {
 constexpr Port kMetres{"depth", "/camvox/depth/image_raw"};
 constexpr Port kMillimetres{"depth_mm", "/camvox/depth/image_mm"};
 constexpr Port kCameraInfo{"camera_info", "/camvox/depth/camera_info"};
+
+constexpr std::size_t kMaxWaiting = 4;  // clouds in lockstep; sync sends no more ahead
 
 /// Standard deviations per axis (rad, m) of a covariance: root of the mean variance.
 std::array<double, 2> sigmas_of(const geometry::Matrix6d& covariance) {
@@ -26,6 +29,7 @@ DepthComponent::DepthComponent(Context& context)
       config_(context.parameters<DepthComponentConfig>()),
       projector_(sensors::CameraModel(config_.camera), config_.projector),
       T_camera_lidar_(sensors::make_rig_calibration(config_.rig).T_camera_lidar()),
+      accumulator_(config_.accumulate_scans, config_.rig),
       progress_(context),
       depth_images_(context.advertise<DepthImage>({"depth_image", topics::kDepthImage},
                                                   {.qos = qos::kFrames})),
@@ -41,8 +45,12 @@ DepthComponent::DepthComponent(Context& context)
                                 [this](const auto& extrinsics) { on_extrinsics(*extrinsics); },
                                 {.qos = qos::kState, .required = false});
   context.subscribe<Cloud>({"cloud", topics::kCloud},
-                           [this](const auto& cloud) { on_cloud(*cloud); },
-                           {.qos = qos::kFrames});
+                           [this](const auto& cloud) { on_cloud(cloud); },
+                           {.qos = qos::kFrames, .max_held = static_cast<int>(kMaxWaiting) + 1});
+  if (config_.accumulate_scans == 1) return;
+  context.subscribe<FramePose>({"frame_pose", topics::kFramePose},
+                               [this](const auto& pose) { on_pose(*pose); },
+                               {.qos = qos::kKeyframes});
 }
 
 void DepthComponent::on_extrinsics(const Extrinsics& extrinsics) {
@@ -57,8 +65,35 @@ void DepthComponent::on_extrinsics(const Extrinsics& extrinsics) {
   context_.log().info("extrinsics version {} from now on", extrinsics_version_);
 }
 
-void DepthComponent::on_cloud(const Cloud& cloud) {
+void DepthComponent::on_cloud(const Sample<Cloud>& cloud) {
   const auto work = progress_.measure();
+  if (!config_.lockstep || config_.accumulate_scans == 1) return process(*cloud);
+  if (first_cloud_id_ == 0) first_cloud_id_ = cloud->header().frame_id();
+  waiting_.push_back(cloud);
+  process_waiting();
+  if (waiting_.size() > kMaxWaiting) {  // tracking left a frame out: better late than never
+    process(*waiting_.front());
+    waiting_.pop_front();
+  }
+}
+
+void DepthComponent::on_pose(const FramePose& pose) {
+  const auto work = progress_.measure();
+  newest_pose_id_ = std::max(newest_pose_id_, pose.header().frame_id());
+  accumulator_.add_pose(pose);
+  process_waiting();
+}
+
+void DepthComponent::process_waiting() {
+  while (!waiting_.empty()) {
+    const auto id = waiting_.front()->header().frame_id();
+    if (id != first_cloud_id_ && newest_pose_id_ + 1 < id) return;
+    process(*waiting_.front());
+    waiting_.pop_front();
+  }
+}
+
+void DepthComponent::process(const Cloud& cloud) {
   auto depth = depth_images_.loan();
   depth->header() = cloud.header();
   depth->extrinsics_version(extrinsics_version_);
@@ -66,10 +101,9 @@ void DepthComponent::on_cloud(const Cloud& cloud) {
   depth->height_px(static_cast<std::uint32_t>(config_.camera.height_px));
   if (cloud.points_count() > 0) {
     const std::size_t pixels = std::size_t{depth->width_px()} * depth->height_px();
-    const depth::ScanView scan{{cloud.points()[0].data(), 4 * std::size_t{cloud.points_count()}},
-                               T_camera_lidar_};
-    const auto report = projector_.project(
-        {&scan, 1}, {depth->depth_m().data(), pixels}, {depth->sigma_m().data(), pixels});
+    const auto report = projector_.project(accumulator_.add(cloud, T_camera_lidar_),
+                                           {depth->depth_m().data(), pixels},
+                                           {depth->sigma_m().data(), pixels});
     depth->depth_m_count(static_cast<std::uint32_t>(pixels));
     depth->sigma_m_count(static_cast<std::uint32_t>(pixels));
     context_.diagnostics().set("returns", report.returns);

@@ -6,7 +6,7 @@
 
 #include "camvox/component/component.hpp"
 #include "camvox/component/progress.hpp"
-#include "camvox/deskew_component/odometry_steps.hpp"
+#include "camvox/conversion/odometry_steps.hpp"
 #include "camvox/interfaces/camvox_interfaces.hpp"
 #include "camvox/lidar/deskew.hpp"
 #include "camvox/lidar/inertial_motion.hpp"
@@ -57,8 +57,8 @@ class DeskewComponent final : public Component {
   sensors::RigCalibration rig_;
   geometry::SE3 T_camera_imu_;
   lidar::InertialMotionFilter filter_;
-  deskew_component::OdometrySteps steps_;
-  std::optional<deskew_component::CameraStep> last_step_;
+  conversion::OdometrySteps steps_;
+  std::optional<conversion::CameraStep> last_step_;
   ProgressReporter progress_;
   Publisher<Cloud> clouds_;
   std::deque<Sample<Scan>> waiting_;  // in lockstep, for poses

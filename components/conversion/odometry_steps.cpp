@@ -1,10 +1,10 @@
-#include "camvox/deskew_component/odometry_steps.hpp"
+#include "camvox/conversion/odometry_steps.hpp"
 
 #include <stdexcept>
 
 #include "camvox/conversion/pose.hpp"
 
-namespace camvox::deskew_component {
+namespace camvox::conversion {
 
 using camvox_interfaces::msg::FramePose;
 
@@ -19,8 +19,8 @@ std::optional<CameraStep> OdometrySteps::add(const FramePose& pose) {
   const Last next{pose.header().stamp_ns(),
                   pose.map_epoch(),
                   pose.reference_keyframe_id(),
-                  conversion::to_se3(pose.T_map_camera()),
-                  conversion::to_se3(pose.T_keyframe_camera())};
+                  to_se3(pose.T_map_camera()),
+                  to_se3(pose.T_keyframe_camera())};
   const auto previous = last_;
   // A little older: out of order. Much older: the clock was set back, so begin again.
   constexpr std::int64_t kClockJump_ns = 1'000'000'000;
@@ -39,4 +39,4 @@ std::optional<CameraStep> OdometrySteps::add(const FramePose& pose) {
   return step;
 }
 
-}  // namespace camvox::deskew_component
+}  // namespace camvox::conversion

@@ -5,7 +5,7 @@
 #include "camvox/geometry/se3.hpp"
 #include "camvox/interfaces/camvox_interfaces.hpp"
 
-namespace camvox::deskew_component {
+namespace camvox::conversion {
 
 /// Movement of the camera between two frames, as tracking saw it.
 struct CameraStep {
@@ -34,4 +34,4 @@ class OdometrySteps {
   std::optional<Last> last_;
 };
 
-}  // namespace camvox::deskew_component
+}  // namespace camvox::conversion

@@ -1,10 +1,10 @@
-#include "camvox/deskew_component/odometry_steps.hpp"
+#include "camvox/conversion/odometry_steps.hpp"
 
 #include <gtest/gtest.h>
 
 #include "camvox/conversion/pose.hpp"
 
-namespace camvox::deskew_component {
+namespace camvox::conversion {
 namespace {
 
 using camvox_interfaces::msg::FramePose;
@@ -15,8 +15,8 @@ FramePose pose_at(std::int64_t stamp_ns, double x_map_m, double x_keyframe_m) {
   pose.header().stamp_ns(stamp_ns);
   pose.state(camvox_interfaces::msg::TRACKING_OK);
   pose.reference_keyframe_id(1);
-  pose.T_map_camera(conversion::to_array(SE3({}, {x_map_m, 0.0, 0.0})));
-  pose.T_keyframe_camera(conversion::to_array(SE3({}, {x_keyframe_m, 0.0, 0.0})));
+  pose.T_map_camera(to_array(SE3({}, {x_map_m, 0.0, 0.0})));
+  pose.T_keyframe_camera(to_array(SE3({}, {x_keyframe_m, 0.0, 0.0})));
   return pose;
 }
 
@@ -67,4 +67,4 @@ TEST(OdometrySteps, FollowsAClockThatWasSetBack) {
 }
 
 }  // namespace
-}  // namespace camvox::deskew_component
+}  // namespace camvox::conversion
