@@ -42,20 +42,17 @@ ImageVerdict FrameAssembler::judge_image(std::int64_t driver_stamp_ns) {
   const std::int64_t stamp_ns = lidar_time_ns(driver_stamp_ns);
   ++image_counters_.received;
   const auto verdict = guard_.judge(stamp_ns);
+  image_counters_.count(verdict);
   switch (verdict) {
     case StampVerdict::kDuplicate:
-      ++image_counters_.duplicates;
       return ImageVerdict::kDuplicate;
     case StampVerdict::kEarlier:
-      ++image_counters_.late;
       ++frame_counters_.left_out;
       return ImageVerdict::kOutOfOrder;
     case StampVerdict::kSuspect:
-      ++image_counters_.suspects;
       ++frame_counters_.left_out;
       return ImageVerdict::kSuspect;
     case StampVerdict::kJump:
-      ++image_counters_.clock_jumps;
       last_image_ns_.reset();
       break;
     case StampVerdict::kNext:

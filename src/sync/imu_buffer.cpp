@@ -5,23 +5,10 @@
 namespace camvox::sync {
 
 bool ImuBuffer::add(const ImuSample& sample) {
-  switch (guard_.judge(sample.stamp_ns)) {
-    case StampVerdict::kDuplicate:
-      ++counters_.duplicates;
-      return false;
-    case StampVerdict::kEarlier:
-      ++counters_.late;
-      return false;
-    case StampVerdict::kSuspect:
-      ++counters_.suspects;
-      return false;
-    case StampVerdict::kJump:
-      ++counters_.clock_jumps;
-      samples_.clear();
-      break;
-    case StampVerdict::kNext:
-      break;
-  }
+  const auto verdict = guard_.judge(sample.stamp_ns);
+  counters_.count(verdict);
+  if (!is_usable(verdict)) return false;
+  if (verdict == StampVerdict::kJump) samples_.clear();
   ++counters_.used;
   samples_.push_back(sample);
   if (samples_.size() > max_samples_) samples_.pop_front();

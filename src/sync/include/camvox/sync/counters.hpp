@@ -2,6 +2,8 @@
 
 #include <cstdint>
 
+#include "camvox/sync/stamp_guard.hpp"
+
 namespace camvox::sync {
 
 /// What became of the messages of one sensor.
@@ -14,6 +16,26 @@ struct StreamCounters {
   std::uint64_t suspects = 0;    ///< Stamp far from all others; left out.
   std::uint64_t clock_jumps = 0;
   std::uint64_t malformed = 0;  ///< Could not be read; see the log.
+
+  /// Counts what the guard says of a message's stamp; what may be used is counted by its user.
+  void count(StampVerdict verdict) {
+    switch (verdict) {
+      case StampVerdict::kDuplicate:
+        ++duplicates;
+        break;
+      case StampVerdict::kEarlier:
+        ++late;
+        break;
+      case StampVerdict::kSuspect:
+        ++suspects;
+        break;
+      case StampVerdict::kJump:
+        ++clock_jumps;
+        break;
+      case StampVerdict::kNext:
+        break;
+    }
+  }
 };
 
 /// What became of the triggers.

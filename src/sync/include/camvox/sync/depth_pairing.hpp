@@ -20,23 +20,10 @@ class DepthPairing {
   /// Whether a message with this stamp is worth reading; if so, `add` must follow.
   [[nodiscard]] bool accepts(std::int64_t stamp_ns) {
     ++counters_.received;
-    switch (guard_.judge(stamp_ns)) {
-      case StampVerdict::kDuplicate:
-        ++counters_.duplicates;
-        return false;
-      case StampVerdict::kEarlier:
-        ++counters_.late;
-        return false;
-      case StampVerdict::kSuspect:
-        ++counters_.suspects;
-        return false;
-      case StampVerdict::kJump:
-        ++counters_.clock_jumps;
-        waiting_.clear();
-        break;
-      case StampVerdict::kNext:
-        break;
-    }
+    const auto verdict = guard_.judge(stamp_ns);
+    counters_.count(verdict);
+    if (!is_usable(verdict)) return false;
+    if (verdict == StampVerdict::kJump) waiting_.clear();
     if (waiting_.size() >= capacity_) waiting_.pop_front();
     return true;
   }

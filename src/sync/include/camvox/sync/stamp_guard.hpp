@@ -14,6 +14,11 @@ enum class StampVerdict : std::uint8_t {
   kJump,     ///< The second one of another clock: what came before is of no use any more.
 };
 
+/// Whether a sensor whose messages must come in order can use this one.
+[[nodiscard]] constexpr bool is_usable(StampVerdict verdict) {
+  return verdict == StampVerdict::kNext || verdict == StampVerdict::kJump;
+}
+
 /// Watches the stamps of one sensor. One stamp that is far off is a glitch; two in a row are a
 /// clock that was set, a driver that was started again, or a sensor that comes back after a pause.
 class StampGuard {
