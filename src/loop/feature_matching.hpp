@@ -16,11 +16,13 @@ struct FeatureMatch {
 
 struct MatchingRule {
   int max_distance_bits = 64;
-  double max_ratio = 0.85;  ///< Of the nearest to the second nearest distance.
+  double max_ratio = 0.85;          ///< Of the nearest to the second nearest distance.
+  std::size_t max_features = 1000;  ///< Strongest ones of each image that are compared.
 };
 
 /// Matches the query's descriptors with those features of `match` that have depth, all with all:
-/// each must be the other's nearest, and clearly nearer than the next. In the query's order.
+/// each must be the other's nearest, and clearly nearer than the next. In the query's order. At
+/// most 65536 features.
 [[nodiscard]] std::vector<FeatureMatch> match_all(const features::FrameFeatures& query,
                                                   const features::FrameFeatures& match,
                                                   const MatchingRule& rule);

@@ -75,11 +75,7 @@ class Verifier {
     keep_ransac_inliers(*start);
     auto estimate = optimize(*start);
     if (estimate.status == PoseEstimate::Status::kOk) {
-      for (const double radius_px : {config_.search_radius_px, 0.6 * config_.search_radius_px}) {
-        search_around(estimate.T_world_camera, radius_px);
-        estimate = optimize(estimate.T_world_camera);
-        if (estimate.status != PoseEstimate::Status::kOk) break;
-      }
+      estimate = search_and_refine(estimate);
     }
     if (estimate.status != PoseEstimate::Status::kOk)
       return fail(VerificationStatus::kTooFewInliers);
@@ -97,10 +93,28 @@ class Verifier {
     return result_;
   }
 
+  /// A start that is off (few matches, noisy depth) finds many of its matches beside the true ones,
+  /// which hold it back: two rounds left errors of 0.1 m at 3 m that five do not.
+  PoseEstimate search_and_refine(PoseEstimate estimate) {
+    constexpr double kStays_rad = 3e-4;
+    constexpr double kStays_m = 1e-3;
+    for (int round = 0; round < config_.guided_rounds; ++round) {
+      const SE3 before = estimate.T_world_camera;
+      search_around(before, config_.search_radius_px);
+      estimate = optimize(before);
+      if (estimate.status != PoseEstimate::Status::kOk) break;
+      const geometry::Vector6d step = geometry::local(before, estimate.T_world_camera);
+      if (step.head<3>().norm() < kStays_rad && step.tail<3>().norm() < kStays_m) break;
+    }
+    return estimate;
+  }
+
   void match_by_appearance() {
     const auto& first = *place_.front().features;
-    for (const auto& match :
-         match_all(query_, first, {config_.max_distance_bits, config_.max_ratio})) {
+    const MatchingRule rule = {config_.max_distance_bits,
+                               config_.max_ratio,
+                               static_cast<std::size_t>(config_.matched_features)};
+    for (const auto& match : match_all(query_, first, rule)) {
       pairs_.push_back({match.query, place_point(place_.front(), match.match, camera_)});
     }
   }

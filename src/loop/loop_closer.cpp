@@ -76,6 +76,7 @@ VerificationTask LoopCloser::detect(KeyframeId id) const {
            score.matches < config_.verification.min_matches;
   });
   task.candidates = best_places(scores, size_of(config_.max_places));
+  task.same_place_m = config_.min_path_m;
   return task;
 }
 
@@ -123,6 +124,7 @@ VerificationTask::Candidate LoopCloser::candidate(const PlaceScore& score) const
   VerificationTask::Candidate result;
   result.match_id = score.keyframe_id;
   result.score = score.score;
+  result.p_map_match = map_.find(score.keyframe_id)->T_map_camera.translation();
   auto views = map_.neighbours(score.keyframe_id, size_of(config_.views_per_place) - 1);
   views.insert(views.begin(), score.keyframe_id);
   for (const auto id : views) {
@@ -300,13 +302,21 @@ std::vector<VerifiedPlace> verify(const VerificationTask& task,
                                   const optimization::PinholeCamera& camera,
                                   const VerificationConfig& config) {
   std::vector<VerifiedPlace> places;
+  std::vector<Eigen::Vector3d> confirmed;
   for (const auto& candidate : task.candidates) {
+    const auto beside = [&](const Eigen::Vector3d& p_map) {
+      return (p_map - candidate.p_map_match).norm() < task.same_place_m;
+    };
+    if (std::any_of(confirmed.begin(), confirmed.end(), beside)) continue;
     Place place;
     for (std::size_t i = 0; i < candidate.features.size(); ++i) {
       place.push_back({candidate.features[i].get(), candidate.T_match_camera[i]});
     }
     places.push_back(
         {candidate.match_id, candidate.score, verify(*task.query, place, camera, config)});
+    if (places.back().verification.status == VerificationStatus::kOk) {
+      confirmed.push_back(candidate.p_map_match);
+    }
   }
   return places;
 }

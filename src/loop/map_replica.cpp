@@ -5,6 +5,7 @@
 #include <queue>
 #include <stdexcept>
 #include <string>
+#include <unordered_map>
 
 namespace camvox::loop {
 namespace {
@@ -97,29 +98,41 @@ std::map<KeyframeId, double> MapReplica::path_lengths(KeyframeId from,
     looped[a].push_back(b);
     looped[b].push_back(a);
   }
+  struct Reached {
+    const Keyframe* keyframe = nullptr;
+    double length_m = std::numeric_limits<double>::infinity();  ///< Shortest so far.
+  };
+  std::unordered_map<KeyframeId, Reached> reached;  // looked up only
   std::map<KeyframeId, double> lengths;
   using Open = std::pair<double, KeyframeId>;
   std::priority_queue<Open, std::vector<Open>, std::greater<>> open;
-  open.emplace(0.0, from);
+  const auto reach = [&](KeyframeId id, const Eigen::Vector3d& p_map, double length_m) {
+    auto& node = reached[id];
+    if (node.keyframe == nullptr) node.keyframe = find(id);
+    if (node.keyframe == nullptr) return;
+    length_m += (node.keyframe->T_map_camera.translation() - p_map).norm();
+    if (length_m > max_m || !(length_m < node.length_m)) return;
+    node.length_m = length_m;
+    open.emplace(length_m, id);
+  };
+  if (const auto* start = find(from)) reach(from, start->T_map_camera.translation(), 0.0);
   while (!open.empty()) {
     const auto [length_m, id] = open.top();
     open.pop();
-    const auto* keyframe = find(id);
-    if (keyframe == nullptr || length_m > max_m || !lengths.emplace(id, length_m).second) continue;
-    const auto step = [&](KeyframeId other) {
-      const auto* next = find(other);
-      if (next == nullptr || lengths.contains(other)) return;
-      const double step_m =
-          (next->T_map_camera.translation() - keyframe->T_map_camera.translation()).norm();
-      open.emplace(length_m + step_m, other);
-    };
-    step(keyframe->parent);
-    for (const auto child : keyframe->children) step(child);
+    if (length_m > reached.at(id).length_m) continue;  // a shorter way was found meanwhile
+    lengths.emplace(id, length_m);
+    const auto* keyframe = reached.at(id).keyframe;
+    const Eigen::Vector3d& p_map = keyframe->T_map_camera.translation();
+    reach(keyframe->parent, p_map, length_m);
+    for (const auto child : keyframe->children) reach(child, p_map, length_m);
     for (const auto& [other, landmarks] : keyframe->shared_landmarks) {
-      if (landmarks >= kMinShared) step(other);
+      if (landmarks >= kMinShared) reach(other, p_map, length_m);
     }
     if (const auto found = looped.find(id); found != looped.end()) {
-      for (const auto other : found->second) open.emplace(length_m, other);
+      for (const auto other : found->second) {
+        const auto* end = find(other);
+        if (end != nullptr) reach(other, end->T_map_camera.translation(), length_m);
+      }
     }
   }
   return lengths;

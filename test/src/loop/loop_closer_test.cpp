@@ -141,6 +141,26 @@ TEST_F(LoopCloserTest, ForgetsRemovedKeyframes) {
   for (const auto& loop : closer_.loops()) EXPECT_NE(loop.match_id, change.removed[0]);
 }
 
+// A place beside one that is confirmed says nothing new; one elsewhere may show a twin.
+TEST_F(LoopCloserTest, VerifiesOnePlaceOnce) {
+  drift_rad_ = 0.0;
+  for (std::size_t i = 0; i < 60; ++i) drive_to(i);
+  auto task =
+      closer_.detect_lost(std::make_shared<features::FrameFeatures>(world_.look(truth(20), 12.0)));
+  ASSERT_GE(task.candidates.size(), 1U);
+  task.candidates = {task.candidates[0], task.candidates[0]};
+  const auto count = [&] {
+    return verify(task, world_.camera, closer_.config().verification).size();
+  };
+  EXPECT_EQ(count(), 2U);
+  task.same_place_m = 10.0;
+  EXPECT_EQ(count(), 1U);
+  task.candidates[1].p_map_match.x() += 11.0;
+  EXPECT_EQ(count(), 2U);
+  task.query = std::make_shared<features::FrameFeatures>(world_.look(truth(80), 12.0));
+  EXPECT_EQ(count(), 2U);  // none was confirmed
+}
+
 // A graph that rejects all its loops has nothing to say; it must not pass for a closed loop.
 TEST(CorrectTest, RejectedLoopsMoveNothing) {
   CorrectionTask task;

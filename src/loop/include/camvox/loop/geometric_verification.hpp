@@ -15,6 +15,7 @@ namespace camvox::loop {
 struct VerificationConfig {
   int max_distance_bits = 64;             ///< Of descriptors matched without a pose.
   double max_ratio = 0.85;                ///< Of the nearest to the second nearest distance.
+  int matched_features = 1000;            ///< Strongest ones matched without a pose.
   int min_matches = 12;                   ///< Fewer matches or RANSAC inliers: no attempt.
   int ransac_iterations = 400;            ///< At most.
   std::int64_t seed = 1;                  ///< Of the samples.
@@ -23,6 +24,7 @@ struct VerificationConfig {
   double ransac_error_px = 5.0;           ///< Largest error of an inlier of octave 0.
   double search_radius_px = 8.0;          ///< Of the matching with a pose.
   int guided_distance_bits = 72;          ///< Of descriptors matched with a pose.
+  int guided_rounds = 5;                  ///< Of matching with a pose and refinement, at most.
   int min_inliers = 40;                   ///< After refinement.
   int min_cells = 6;                      ///< Of 8 x 4 image cells, those with an inlier.
   double depth_tolerance = 0.06;          ///< Relative difference at which depths still agree.
@@ -35,6 +37,7 @@ struct VerificationConfig {
     const auto bits = config::at_most(256);
     field("max_distance_bits", self.max_distance_bits, config::at_least(0), bits);
     field("max_ratio", self.max_ratio, config::greater_than(0.0), config::at_most(1.0));
+    field("matched_features", self.matched_features, config::at_least(10), config::at_most(65536));
     field("min_matches", self.min_matches, config::at_least(4));
     field("ransac_iterations", self.ransac_iterations, config::at_least(1));
     field("seed", self.seed, config::at_least(0));
@@ -43,6 +46,7 @@ struct VerificationConfig {
     field("ransac_error_px", self.ransac_error_px, config::greater_than(0.0));
     field("search_radius_px", self.search_radius_px, config::greater_than(0.0));
     field("guided_distance_bits", self.guided_distance_bits, config::at_least(0), bits);
+    field("guided_rounds", self.guided_rounds, config::at_least(1), config::at_most(20));
     field("min_inliers", self.min_inliers, config::at_least(10));
     field("min_cells", self.min_cells, config::at_least(1), config::at_most(32));
     field("depth_tolerance", self.depth_tolerance, config::greater_than(0.0));
@@ -90,9 +94,9 @@ struct Verification {
 
 /// Is `query` an image of `place`, and from where? In layers: descriptor matches with the first
 /// view; RANSAC over rigid motions of three pairs of points with depth (Horn, 1987), judged in
-/// pixels and depth; search for the features of all views around the pose and refinement; then
-/// the surfaces: depths measured by the query near a projected point must be those predicted.
-/// Deterministic. Work: about 10 ms for 1500 features on one core.
+/// pixels and depth; search for the features of all views around the pose and refinement, again
+/// until the pose stays; then the surfaces: depths measured by the query near a projected point
+/// must be those predicted. Deterministic. Work: about 5 ms for 1500 features on one core.
 [[nodiscard]] Verification verify(const features::FrameFeatures& query,
                                   const Place& place,
                                   const optimization::PinholeCamera& camera,

@@ -66,10 +66,12 @@ struct VerificationTask {
     double score = 0.0;
     std::vector<std::shared_ptr<const features::FrameFeatures>> features;  ///< By view.
     std::vector<geometry::SE3> T_match_camera;                             ///< By view.
+    Eigen::Vector3d p_map_match = Eigen::Vector3d::Zero();                 ///< In today's map.
   };
   KeyframeId query_id = 0;  ///< 0: a lost tracker's frame.
   std::shared_ptr<const features::FrameFeatures> query;
   std::vector<Candidate> candidates;
+  double same_place_m = 0.0;  ///< Candidates nearer to one that was confirmed are not verified.
 };
 
 struct VerifiedPlace {
@@ -190,7 +192,8 @@ class LoopCloser {
   LoopStatistics statistics_;
 };
 
-/// Verifies every candidate of a task; those that fail are included with their status.
+/// Verifies the candidates of a task, less those that are beside one that was confirmed and could
+/// only say the same; those that fail are included with their status.
 [[nodiscard]] std::vector<VerifiedPlace> verify(const VerificationTask& task,
                                                 const optimization::PinholeCamera& camera,
                                                 const VerificationConfig& config);
