@@ -14,6 +14,7 @@
 #include "camvox/import/seven_scenes.hpp"
 #include "camvox/optimization/point_observation.hpp"
 #include "camvox/tracking/keyframe.hpp"
+#include "camvox/trajectory/trajectory_file.hpp"
 
 namespace camvox::bench {
 
@@ -39,6 +40,16 @@ struct RedKitchen {
       frame.T_map_camera = read_pose(path + ".pose.txt");
       frames.push_back(std::move(frame));
     }
+  }
+
+  /// Takes the poses of another trajectory for true, e.g. of a run through the whole sequence.
+  /// False when it does not have all frames.
+  [[nodiscard]] bool take_poses(const std::filesystem::path& tum) {
+    const auto trajectory = trajectory::read_tum(tum);
+    if (!trajectory.ok() || trajectory->size() != frames.size()) return false;
+    for (std::size_t i = 0; i < frames.size(); ++i)
+      frames[i].T_map_camera = (*trajectory)[i].T_world_body;
+    return true;
   }
 
   std::vector<tracking::Keyframe> frames;
