@@ -68,7 +68,7 @@ void ComponentSlot::try_construct() {
       executor_,
       log_,
       [failures = failures_](const std::exception_ptr& error) { failures->add(error); });
-  context_->on_exit_request(environment_.exit_request);
+  context_->on_exit_request([failures = failures_] { failures->exit_requested = true; });
   {
     const std::lock_guard lock(failures_->mutex);
     failures_->tenant = context_->tenant();
@@ -103,7 +103,13 @@ void ComponentSlot::Failures::add(const std::exception_ptr& error) {
   pending = true;  // the rest is done in tick(), on another thread
 }
 
+bool ComponentSlot::is_idle() const {
+  return context_ == nullptr || context_->tenant()->busy_time().count() == 0;
+}
+
 void ComponentSlot::tick(Clock::time_point now) {
+  // Not before the callback that asked is over: if it failed, the exit code must say so.
+  const bool exits = failures_->exit_requested && is_idle();
   if (failures_->pending.exchange(false)) handle_failure(now);
   if (state_ == ComponentState::kRestarting && now >= restart_at_) {
     ++restarts_;
@@ -111,6 +117,9 @@ void ComponentSlot::tick(Clock::time_point now) {
     launch();
   }
   if (state_ == ComponentState::kRunning) watch(now);
+  if (exits && failures_->exit_requested.exchange(false) && environment_.exit_request) {
+    environment_.exit_request();
+  }
 }
 
 void ComponentSlot::handle_failure(Clock::time_point now) {

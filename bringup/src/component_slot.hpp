@@ -70,6 +70,7 @@ class ComponentSlot {
     std::shared_ptr<Logger> log;
     std::atomic<std::uint64_t> count = 0;
     std::atomic<bool> pending = false;  ///< Something is to be done about it in tick().
+    std::atomic<bool> exit_requested = false;
     std::mutex mutex;
     std::string last;
     std::weak_ptr<dds::Tenant> tenant;
@@ -80,6 +81,7 @@ class ComponentSlot {
   void try_construct();
   void handle_failure(Clock::time_point now);
   void watch(Clock::time_point now);
+  [[nodiscard]] bool is_idle() const;
   void abandon();
 
   std::uint64_t id_;
