@@ -21,6 +21,8 @@ struct RunOptions {
   std::string bag;  ///< Replayed, if not empty.
   bool lockstep = false;
   std::string output;  ///< Folder for results, if not empty.
+  std::string map;     ///< Map file to start with, if not empty.
+  bool localisation_only = false;
   bool overwrite = false;
   bool check = false;
   bool print_config = false;
@@ -68,6 +70,11 @@ void apply_options(const RunOptions& options, SystemConfig& config) {
   if (!options.bag.empty()) replay_bag(options.bag, config);
   if (options.lockstep) {
     config.shared_parameters["lockstep"] = from_command_line(true, "--lockstep");
+  }
+  if (!options.map.empty())
+    config.shared_parameters["load_map"] = from_command_line(options.map, "--map");
+  if (options.localisation_only) {
+    config.shared_parameters["localisation_only"] = from_command_line(true, "--localisation-only");
   }
   if (!options.output.empty()) {
     config.file_parameters.insert("output_dir");  // no error when no component saves anything
@@ -147,6 +154,12 @@ void add_run(CLI::App& app, Action& action) {
                     options->lockstep,
                     "Replay as fast as possible, dropping nothing, the same bytes each time");
   command->add_option("--out", options->output, "Folder for results");
+  auto* map = command->add_option("--map", options->map, "Map file of another run to start with");
+  command
+      ->add_flag("--localisation-only",
+                 options->localisation_only,
+                 "Only find and follow the pose in --map; the map stays as it is")
+      ->needs(map);
   command->add_flag("--overwrite", options->overwrite, "Let --out be a folder with files in it");
   command->add_flag("--check", options->check, "Only check the config");
   command->add_flag("--print-config",

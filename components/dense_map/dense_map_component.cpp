@@ -39,6 +39,13 @@ DenseMapComponent::DenseMapComponent(Context& context)
   context.subscribe<Keyframe>({"keyframe", topics::kKeyframe},
                               [this](const auto& keyframe) { on_keyframe(*keyframe); },
                               {.qos = qos::kKeyframes});
+  // Of a loaded map: no images of it come, but frames refer to it.
+  context.subscribe<Keyframe>({"map_keyframe", topics::kMapKeyframe},
+                              [this](const auto& keyframe) {
+                                newest_keyframe_ = std::max(newest_keyframe_, keyframe->id());
+                                report_done();
+                              },
+                              {.qos = qos::kKeyframes, .required = false});
   context.subscribe<FramePose>({"frame_pose", topics::kFramePose},
                                [this](const auto& pose) { on_pose(*pose); },
                                {.qos = qos::kKeyframes, .required = false});

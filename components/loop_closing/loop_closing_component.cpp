@@ -79,6 +79,11 @@ void LoopClosingComponent::on_map_keyframe(const Keyframe& message) {
   closer_.insert(conversion::read_keyframe(message));
   order_.know(message.id());
   advance();
+  // Frame 0: no frame of this run is meant. Says that the keyframe has come, and sends for more.
+  auto received = corrections_.loan();
+  received->map_epoch(closer_.map().map_epoch());
+  received->query_keyframe_id(message.id());
+  corrections_.publish(std::move(received));
 }
 
 void LoopClosingComponent::on_map_update(const MapUpdate& message) {

@@ -1,10 +1,14 @@
 #include "camvox/mapping_component/mapping_component.hpp"
 
 #include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <stdexcept>
 #include <utility>
 
 #include "camvox/conversion/map_messages.hpp"
 #include "camvox/conversion/pose.hpp"
+#include "camvox/mapping/map_file.hpp"
 #include "map_update_message.hpp"
 
 namespace camvox {
@@ -28,7 +32,8 @@ MappingComponent::MappingComponent(Context& context)
       local_maps_(context.advertise<msg::LocalMap>({"local_map", topics::kLocalMap},
                                                    {.qos = qos::kFrames})),
       updates_(context.advertise<msg::MapUpdate>({"map_update", topics::kMapUpdate},
-                                                 {.qos = qos::kKeyframes})) {
+                                                 {.qos = qos::kKeyframes})),
+      announcer_(context) {
   context.subscribe<Keyframe>({"keyframe", topics::kKeyframe},
                               [this](const auto& keyframe) { on_keyframe(*keyframe); },
                               {.qos = qos::kKeyframes});
@@ -38,10 +43,20 @@ MappingComponent::MappingComponent(Context& context)
   context.subscribe<LoopCorrection>(
       {"loop_correction", topics::kLoopCorrection},
       [this](const auto& correction) { on_correction(*correction); },
-      {.qos = qos::kKeyframes, .required = config_.wait_for_loop_closing});
+      {.qos = qos::kKeyframes,
+       .required = config_.wait_for_loop_closing || !config_.load_map.empty()});
+  context.on_parameter_change<MappingComponentConfig>(config_,
+                                                      [this](const MappingComponentConfig& next) {
+                                                        config_.save_map = next.save_map;
+                                                        if (next.save_map) save();
+                                                      },
+                                                      {"save_map"});
+  context.every(std::chrono::milliseconds(500), [this] { announce(); });
+  context.every(std::chrono::seconds(1), [this] { report_memory(); });
 }
 
 void MappingComponent::start() {
+  if (!config_.load_map.empty()) load();
   if (config_.lockstep) return;
   runner_ = std::make_unique<mapping_component::JobRunner>(
       [this](mapping::BundleJob job, optimization::BundleSummary summary, double time_s) {
@@ -55,7 +70,49 @@ void MappingComponent::start() {
       });
 }
 
-void MappingComponent::stop() { runner_.reset(); }
+void MappingComponent::stop() {
+  runner_.reset();
+  if (config_.save_map) save();
+}
+
+void MappingComponent::load() {
+  auto loaded = mapping::load_map(config_.load_map, mapper_.model().camera());
+  std::string problem = loaded.status().message();
+  if (loaded.ok() && loaded->map.keyframes().empty()) problem = config_.load_map + ": an empty map";
+  if (!problem.empty()) {
+    context_.request_exit();  // nothing can be done without
+    throw std::runtime_error(problem);
+  }
+  mapper_.restore(std::move(loaded->map), loaded->epoch);
+  const auto& keyframes = mapper_.map().keyframes();
+  newest_keyframe_ = keyframes.rbegin()->first;
+  context_.log().info("{}: {} keyframes, {} landmarks, epoch {}",
+                      config_.load_map,
+                      keyframes.size(),
+                      mapper_.map().landmark_count(),
+                      mapper_.epoch());
+  announcer_.begin(mapper_, updates_);
+}
+
+void MappingComponent::save() {
+  const auto& map = mapper_.map();
+  const bool changed = !config_.localisation_only && !map.keyframes().empty();
+  if (config_.output_dir.empty() || !changed) return;
+  const auto path = std::filesystem::path(config_.output_dir) / "map.mcap";
+  const auto status = mapping::save_map(path, map, mapper_.epoch(), mapper_.model().camera());
+  if (!status.ok()) return context_.log().error("{}", status.message());
+  context_.log().info("map of {} keyframes, {} landmarks saved to {}",
+                      map.keyframes().size(),
+                      map.landmark_count(),
+                      path.string());
+}
+
+/// Until tracking has sent a pose it may not be there yet, or not hear what is said.
+void MappingComponent::announce() {
+  announcer_.repeat();
+  const bool unheard = last_.header.frame_id() == 0 && waiting_.empty();
+  if (!config_.load_map.empty() && announcer_.done() && unheard) publish_local_map(last_);
+}
 
 void MappingComponent::on_keyframe(const Keyframe& message) {
   const auto work = progress_.measure();
@@ -73,7 +130,12 @@ void MappingComponent::on_pose(const FramePose& pose) {
 
 void MappingComponent::on_correction(const LoopCorrection& correction) {
   const auto work = progress_.measure();
-  if (correction.keyframe_ids_count() > 0) {
+  if (correction.header().frame_id() == 0) {  // about a keyframe of the loaded map
+    announcer_.acknowledge(correction.query_keyframe_id());
+    if (announcer_.done() && last_.header.frame_id() == 0) publish_local_map(last_);
+    return answer_ready();
+  }
+  if (correction.keyframe_ids_count() > 0 && !config_.localisation_only) {
     mapping::LoopProposal proposal;
     proposal.map_epoch = correction.map_epoch();
     proposal.query = correction.query_keyframe_id();
@@ -111,6 +173,8 @@ bool MappingComponent::is_ready(const Waiting& frame) const {
 }
 
 void MappingComponent::answer_ready() {
+  // In lockstep nothing depends on how far the announcement has come.
+  if (config_.lockstep && !announcer_.done()) return;
   while (!waiting_.empty() && is_ready(waiting_.front())) {
     const Waiting frame = waiting_.front();
     const auto keyframe = keyframes_.find(frame.reference_id);
@@ -129,12 +193,22 @@ void MappingComponent::answer_ready() {
   }
 }
 
+std::string MappingComponent::problem_with(const tracking::Keyframe& keyframe) const {
+  if (config_.localisation_only) return "the map stays as it is (localisation_only)";
+  const bool tied = mapper_.map().anchor(keyframe.parent_id).keyframe != 0;
+  if (config_.load_map.empty() || mapper_.map().keyframes().empty() || tied) return {};
+  return "it is not tied to the loaded map (tracking needs load_map, too)";
+}
+
 void MappingComponent::insert(const tracking::Keyframe& keyframe) {
   newest_keyframe_ = std::max(newest_keyframe_, keyframe.id);
-  mapper_.set_reference(keyframe.id);
-  const auto inserted = mapper_.insert(keyframe);
-  if (!inserted.inserted) {
-    context_.log().warn("keyframe {} not taken: {}", keyframe.id, inserted.problem);
+  auto problem = problem_with(keyframe);
+  if (problem.empty()) {
+    mapper_.set_reference(keyframe.id);
+    problem = mapper_.insert(keyframe).problem;
+  }
+  if (!problem.empty()) {
+    context_.log().warn("keyframe {} not taken: {}", keyframe.id, problem);
     context_.diagnostics().set("keyframes refused", ++refused_);
     return;
   }
@@ -206,6 +280,19 @@ void MappingComponent::report() {
   diagnostics.set("keyframes", std::uint64_t{mapper_.map().keyframes().size()});
   diagnostics.set("landmarks", std::uint64_t{mapper_.map().landmark_count()});
   diagnostics.set("epoch", mapper_.epoch());
+}
+
+void MappingComponent::report_memory() {
+  const auto& map = mapper_.map();
+  if (map.keyframes().empty()) return;
+  const double kb = 1e-3 * static_cast<double>(map.memory_bytes());
+  const double keyframe_kb = kb / static_cast<double>(map.keyframes().size());
+  auto& diagnostics = context_.diagnostics();
+  diagnostics.set("map MB", 1e-3 * kb);
+  diagnostics.set("kB per keyframe", keyframe_kb);
+  const bool over = keyframe_kb > config_.keyframe_budget_kb;
+  diagnostics.report(over ? HealthLevel::kWarn : HealthLevel::kOk,
+                     over ? "the map takes more than keyframe_budget_kb a keyframe" : "ok");
 }
 
 }  // namespace camvox

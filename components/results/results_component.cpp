@@ -60,13 +60,14 @@ ResultsComponent::ResultsComponent(Context& context)
   context.subscribe<FramePose>({"frame_pose", topics::kFramePose},
                                [this](const auto& pose) { add_pose(*pose); },
                                {.qos = kAll.qos, .required = true});
-  context.subscribe<Keyframe>({"keyframe", topics::kKeyframe},
-                              [this](const auto& keyframe) {
-                                path_.add_keyframe(keyframe->id(),
-                                                   keyframe->header().stamp_ns(),
-                                                   conversion::to_se3(keyframe->T_map_camera()));
-                              },
-                              {.qos = qos::kKeyframes, .required = false});
+  const auto add_keyframe = [this](const auto& keyframe) {
+    path_.add_keyframe(keyframe->id(),
+                       keyframe->header().stamp_ns(),
+                       conversion::to_se3(keyframe->T_map_camera()));
+  };
+  const SubscribeOptions keyframes{.qos = qos::kKeyframes, .required = false};
+  context.subscribe<Keyframe>({"keyframe", topics::kKeyframe}, add_keyframe, keyframes);
+  context.subscribe<Keyframe>({"map_keyframe", topics::kMapKeyframe}, add_keyframe, keyframes);
   context.subscribe<MapUpdate>({"map_update", topics::kMapUpdate},
                                [this](const auto& update) { add_update(*update); },
                                {.qos = qos::kKeyframes, .required = false});

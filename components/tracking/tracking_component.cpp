@@ -19,6 +19,14 @@ std::optional<geometry::SO3> camera_rotation(const std::array<double, 4>& rotati
   return R_camera_imu * geometry::SO3(q) * R_camera_imu.inverse();
 }
 
+/// The tracker's switches follow from the component's, which mapping has as well.
+tracking::TrackerConfig tracker_config(const TrackingComponentConfig& config) {
+  auto tracker = config.tracker;
+  tracker.localisation_only = tracker.localisation_only || config.localisation_only;
+  tracker.relocalise_at_start = tracker.relocalise_at_start || !config.load_map.empty();
+  return tracker;
+}
+
 }  // namespace
 
 TrackingComponent::TrackingComponent(Context& context)
@@ -27,7 +35,7 @@ TrackingComponent::TrackingComponent(Context& context)
       rig_(sensors::make_rig_calibration(config_.rig)),
       R_camera_imu_((rig_.T_imu_lidar * rig_.T_lidar_camera).inverse().rotation()),
       builder_(config_.frame, config_.camera),
-      tracker_(config_.tracker, builder_.tracking_camera(), rig_.T_body_camera),
+      tracker_(tracker_config(config_), builder_.tracking_camera(), rig_.T_body_camera),
       queue_(config_.use_imu, config_.lockstep),
       odometry_(context, rig_.T_body_camera),
       progress_(context),
@@ -102,8 +110,9 @@ void TrackingComponent::process_ready() {
 
 bool TrackingComponent::may_process() const {
   if (awaited_answer_ != 0) return false;
-  const bool waits = config_.lockstep && config_.wait_for_map && last_frame_id_ != 0;
-  return !waits || map_frame_id_ >= last_frame_id_;
+  if (!config_.lockstep || !config_.wait_for_map) return true;
+  if (last_frame_id_ == 0) return config_.load_map.empty() || !tracker_.map().empty();
+  return map_frame_id_ >= last_frame_id_;
 }
 
 void TrackingComponent::process(const FrameInputs& inputs) {

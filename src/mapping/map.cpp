@@ -37,6 +37,17 @@ std::vector<LandmarkId> Map::landmark_ids() const {
   return ids;
 }
 
+std::vector<KeyframeId> Map::parents_first() const {
+  std::vector<KeyframeId> order;
+  order.reserve(keyframes_.size());
+  if (!keyframes_.empty()) order.push_back(keyframes_.begin()->first);
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    const auto& children = keyframe(order[i]).children;
+    order.insert(order.end(), children.begin(), children.end());
+  }
+  return order;
+}
+
 const MapKeyframe* Map::find_keyframe(KeyframeId id) const {
   const auto found = keyframes_.find(id);
   return found == keyframes_.end() ? nullptr : &found->second;

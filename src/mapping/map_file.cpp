@@ -29,19 +29,6 @@ constexpr std::uint64_t kMaxRecordSize = 64ULL << 20;
 constexpr std::uint64_t kChunkSize = 4ULL << 20;
 constexpr std::uint64_t kTreeNode = 48;
 
-std::vector<KeyframeId> parents_first(const Map& map) {
-  std::vector<KeyframeId> order;
-  order.reserve(map.keyframes().size());
-  for (const auto& [id, keyframe] : map.keyframes()) {
-    if (keyframe.parent == 0) order.push_back(id);
-  }
-  for (std::size_t i = 0; i < order.size(); ++i) {
-    const auto& children = map.keyframe(order[i]).children;
-    order.insert(order.end(), children.begin(), children.end());
-  }
-  return order;
-}
-
 /// Puts messages into a file of ours.
 class Writer {
  public:
@@ -114,7 +101,7 @@ Status write_map(const std::filesystem::path& path,
   const map_file::Header header{
       kMapFileVersion, epoch, map.keyframes().size(), map.landmark_count(), camera};
   if (auto status = writer.write(map_file::kHeader, first_ns, header); !status.ok()) return status;
-  for (const auto id : parents_first(map)) {
+  for (const auto id : map.parents_first()) {
     const auto& keyframe = map.keyframe(id);
     auto status = writer.write(map_file::kKeyframe, keyframe.frame.stamp_ns, keyframe);
     if (!status.ok()) return status;

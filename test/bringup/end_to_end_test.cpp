@@ -12,6 +12,7 @@ namespace camvox::bringup {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
 namespace fs = std::filesystem;
 
 class EndToEnd : public CommandFixture {
@@ -21,7 +22,7 @@ class EndToEnd : public CommandFixture {
     fs::remove_all(folder_);
     fs::create_directories(folder_);
     const std::string words = std::string(CAMVOX_COMMAND) +
-                              " simulate demo --set duration_s=4.0 -o " + recording().string() +
+                              " simulate demo --set duration_s=5.0 -o " + recording().string() +
                               " > /dev/null";
     ASSERT_EQ(std::system(words.c_str()), 0);
   }
@@ -50,7 +51,7 @@ class EndToEnd : public CommandFixture {
   inline static fs::path folder_;
 };
 
-// 4 s and some metres of a drive: the bound is far above the few millimetres that are measured, and
+// 5 s and some metres of a drive: the bound is far above the few millimetres that are measured, and
 // far below what a wrong transform or time would give.
 TEST_F(EndToEnd, TracksEveryFrameAndRepeatsItselfBitByBit) {
   const auto first = run_all(folder_ / "first");
@@ -68,7 +69,8 @@ TEST_F(EndToEnd, TracksEveryFrameAndRepeatsItselfBitByBit) {
   const auto errors = trajectory::statistics(
       trajectory::absolute_errors_m(trajectory::transformed(*origin, pairs)));
   EXPECT_LT(errors.max, 0.1);
-  for (const auto* name : {"trajectory.tum", "odometry.tum", "keyframes.tum", "dense_map.ply"}) {
+  for (const auto* name :
+       {"trajectory.tum", "odometry.tum", "keyframes.tum", "dense_map.ply", "map.mcap"}) {
     const auto bytes = text(folder_ / "first" / name);
     EXPECT_FALSE(bytes.empty()) << name;
     EXPECT_EQ(bytes, text(folder_ / "second" / name)) << name << " differs between two runs";
@@ -77,6 +79,55 @@ TEST_F(EndToEnd, TracksEveryFrameAndRepeatsItselfBitByBit) {
       command({"report", folder_ / "first", "--reference", recording() / "truth_body.tum"});
   EXPECT_EQ(report.exit_code, 0) << report.output;
   EXPECT_THAT(text(folder_ / "first" / "report.html"), HasSubstr("APE rmse"));
+}
+
+// The second run starts nowhere in particular; what it says is to be in the first run's map frame.
+TEST_F(EndToEnd, LocalisesInTheMapOfAnotherRun) {
+  const auto mapped = run_all(folder_ / "mapped");
+  ASSERT_EQ(mapped.exit_code, 0) << mapped.output;
+  const auto map = folder_ / "mapped" / "map.mcap";
+  const auto map_bytes = text(map);
+  const auto output = folder_ / "localised";
+  const auto localised = run_all(output, {"--map", map, "--localisation-only"});
+  ASSERT_EQ(localised.exit_code, 0) << localised.output;
+  EXPECT_EQ(map_bytes, text(map));
+  EXPECT_FALSE(fs::exists(output / "map.mcap"));
+
+  const auto truth = trajectory::read_tum(recording() / "truth_body.tum");
+  const auto first = trajectory::read_tum(folder_ / "mapped" / "trajectory.tum");
+  const auto second = trajectory::read_tum(output / "trajectory.tum");
+  ASSERT_TRUE(truth.ok() && first.ok() && second.ok());
+  EXPECT_GE(second->size() + 15, first->size()) << "found within 1.5 s";
+  const auto pairs = trajectory::associate(*truth, *second);
+  ASSERT_EQ(pairs.size(), second->size());
+  const auto first_pairs = trajectory::associate(*truth, *first);
+  const auto origin = trajectory::align(first_pairs, trajectory::Alignment::kOrigin);
+  const auto errors = trajectory::statistics(
+      trajectory::absolute_errors_m(trajectory::transformed(*origin, pairs)));
+  EXPECT_LT(errors.max, 0.1);
+  EXPECT_THAT(text(output / "frames.csv"), HasSubstr(",localisation_only,1,"));
+  EXPECT_THAT(text(output / "frames.csv"), Not(HasSubstr(",ok,")));
+}
+
+TEST_F(EndToEnd, MapsOnInTheMapOfAnotherRun) {
+  ASSERT_EQ(run_all(folder_ / "before").exit_code, 0);
+  const auto map = folder_ / "before" / "map.mcap";
+  for (const auto* name : {"resumed", "resumed_again"}) {
+    const auto resumed = run_all(folder_ / name, {"--map", map});
+    ASSERT_EQ(resumed.exit_code, 0) << resumed.output;
+    EXPECT_THAT(resumed.output, Not(HasSubstr("not taken")));
+  }
+  const auto bytes = text(folder_ / "resumed" / "map.mcap");
+  EXPECT_NE(bytes, text(map));
+  EXPECT_EQ(bytes, text(folder_ / "resumed_again" / "map.mcap"));
+}
+
+TEST_F(EndToEnd, AMapThatIsBrokenEndsTheRun) {
+  const auto map = folder_ / "broken.mcap";
+  std::ofstream(map) << "no map at all";
+  const auto result = run_all(folder_ / "refused", {"--map", map});
+  EXPECT_EQ(result.exit_code, 3) << result.output;
+  EXPECT_THAT(result.output, HasSubstr("broken.mcap: the map cannot be loaded: not an MCAP file"));
 }
 
 TEST_F(EndToEnd, WithoutLidarNothingIsTrackedAndNothingBreaks) {

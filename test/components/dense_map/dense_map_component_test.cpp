@@ -144,6 +144,15 @@ TEST_F(DenseMapTest, PointsFollowTheMap) {
   component.stop();
 }
 
+TEST_F(DenseMapTest, FramesInALoadedMapAreDoneAtOnce) {
+  DenseMapComponent component(fake_);
+  send_pose(1, 33);
+  EXPECT_TRUE(fake_.published<Progress>("progress").empty());
+  fake_.send<Keyframe>("map_keyframe", [](Keyframe& keyframe) { keyframe.id(33); });
+  EXPECT_EQ(fake_.published<Progress>("progress").size(), 1U);
+  component.stop();
+}
+
 TEST_F(DenseMapTest, SavesPcdPlyAndPicture) {
   DenseMapComponent component(fake_);
   send_images(1);

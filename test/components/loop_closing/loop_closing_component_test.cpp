@@ -187,7 +187,12 @@ TEST_F(LoopClosingComponentTest, TellsALostTrackerWhereItIs) {
 TEST_F(LoopClosingComponentTest, RelocalisesInALoadedMap) {
   make(true);
   for (std::size_t i = 0; i < 30; ++i) send_keyframe("map_keyframe", keyframe(i));
-  EXPECT_TRUE(corrections().empty());
+  ASSERT_EQ(corrections().size(), 30U);
+  for (std::size_t i = 0; i < 30; ++i) {  // acknowledgments
+    EXPECT_EQ(corrections()[i]->header().frame_id(), 0U);
+    EXPECT_EQ(corrections()[i]->query_keyframe_id(), i + 1);
+    EXPECT_EQ(corrections()[i]->keyframe_ids_count(), 0U);
+  }
   auto lost = keyframe(12);
   send_keyframe("relocalisation_request", lost);
   EXPECT_EQ(fake_.published<RelocalisationAnswer>("relocalisation_answer").at(0)->found(), 1);

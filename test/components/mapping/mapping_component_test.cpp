@@ -1,12 +1,16 @@
 #include "camvox/mapping_component/mapping_component.hpp"
 
 #include <gmock/gmock.h>
+#include <unistd.h>
 
+#include <filesystem>
+#include <fstream>
 #include <random>
 
 #include "camvox/component/fake_context.hpp"
 #include "camvox/conversion/map_messages.hpp"
 #include "camvox/conversion/pose.hpp"
+#include "camvox/mapping/map_file.hpp"
 
 namespace camvox {
 namespace {
@@ -89,6 +93,11 @@ class MappingTest : public testing::Test {
   }
   [[nodiscard]] std::vector<std::shared_ptr<const LocalMap>> maps() const {
     return fake_.published<LocalMap>("local_map");
+  }
+  [[nodiscard]] std::string log() const {
+    std::string text;
+    for (const auto& entry : fake_.log_entries()) text += entry.text + "\n";
+    return text;
   }
 
   std::vector<Eigen::Vector3d> points_map_;
@@ -214,6 +223,167 @@ TEST_F(MappingTest, AMalformedKeyframeIsRefusedByName) {
     EXPECT_THAT(error.what(), HasSubstr("keyframe 9: lists of different length"));
   }
   mapping.stop();
+}
+
+TEST_F(MappingTest, SaysWhenTheMapTakesMoreThanItsBudget) {
+  fake_.set_parameter("lockstep", true);
+  fake_.set_parameter("keyframe_budget_kb", std::int64_t{30});
+  MappingComponent mapping(fake_);
+  mapping.start();
+  for (const std::uint64_t id : {1U, 2U}) {
+    send_keyframe(id, 0.3 * static_cast<double>(id - 1));
+    send_pose(id, id);
+  }
+  fake_.advance(std::chrono::seconds(1));
+  // 200 features of 90 bytes, the grid's 12 kB, and 200 landmarks of 200 bytes for both.
+  const auto status = fake_.diagnostics().status();
+  EXPECT_NEAR(std::stod(status.values.at("kB per keyframe")), 50.0, 15.0);
+  EXPECT_EQ(status.level, HealthLevel::kWarn);
+  EXPECT_THAT(status.message, HasSubstr("keyframe_budget_kb"));
+  mapping.stop();
+}
+
+/// The same in a map of three keyframes that an earlier run has saved.
+class LoadedMapTest : public MappingTest {
+ protected:
+  LoadedMapTest() {
+    std::filesystem::create_directories(folder_);
+    fake_.set_parameter("lockstep", true);
+    fake_.set_parameter("load_map", file().string());
+    mapping::Mapper mapper({}, tracking::FrameBuilder({}, {}).tracking_camera());
+    for (const std::uint64_t id : {1U, 2U, 3U}) {
+      mapper.process(keyframe(id, 0.3 * static_cast<double>(id - 1)));
+    }
+    const auto status = save_map(file(), mapper.map(), 7, mapper.model().camera());
+    EXPECT_TRUE(status.ok()) << status.message();
+  }
+  ~LoadedMapTest() override { std::filesystem::remove_all(folder_); }
+
+  [[nodiscard]] std::filesystem::path file() const { return folder_ / "map.mcap"; }
+  [[nodiscard]] std::string bytes() const {
+    std::ifstream stream(file(), std::ios::binary);
+    return {std::istreambuf_iterator<char>(stream), {}};
+  }
+  [[nodiscard]] std::vector<std::uint64_t> announced() const {
+    std::vector<std::uint64_t> ids;
+    for (const auto& each : fake_.published<Keyframe>("map_keyframe")) ids.push_back(each->id());
+    return ids;
+  }
+  /// As loop closing does when it has taken a keyframe in.
+  void acknowledge(std::uint64_t id) {
+    fake_.send<LoopCorrection>("loop_correction",
+                               [id](LoopCorrection& received) { received.query_keyframe_id(id); });
+  }
+  void acknowledge_all() {
+    for (const std::uint64_t id : {1U, 2U, 3U, 1U}) acknowledge(id);
+  }
+
+  std::filesystem::path folder_ =
+      std::filesystem::path(testing::TempDir()) / ("mapping_" + std::to_string(getpid()));
+};
+
+TEST_F(LoadedMapTest, IsAnnouncedAsLoopClosingTakesItIn) {
+  MappingComponent mapping(fake_);
+  mapping.start();
+  EXPECT_EQ(announced(), (std::vector<std::uint64_t>{1, 2, 3}));
+  EXPECT_TRUE(fake_.published<MapUpdate>("map_update").empty());
+  acknowledge(1);
+  acknowledge(2);
+  fake_.advance(std::chrono::seconds(2));
+  EXPECT_EQ(announced().back(), 3U) << "sent again: it was not acknowledged";
+  EXPECT_GT(announced().size(), 3U);
+  EXPECT_TRUE(maps().empty()) << "tracking waits until all is known";
+  acknowledge(3);
+  const auto updates = fake_.published<MapUpdate>("map_update");
+  ASSERT_EQ(updates.size(), 1U);
+  EXPECT_EQ(updates[0]->map_epoch(), 7U);
+  EXPECT_EQ(updates[0]->keyframe_ids_count(), 3U);
+  EXPECT_EQ(updates[0]->edges_count(), 3U);
+  EXPECT_EQ(announced().back(), 1U) << "the root once more, behind the update";
+  acknowledge(1);
+  ASSERT_FALSE(maps().empty());
+  const auto map = conversion::read_local_map(*maps().back());
+  EXPECT_EQ(map.map_epoch, 7U);
+  EXPECT_EQ(map.next_keyframe_id, 4U);
+  EXPECT_EQ(map.keyframes.size(), 3U);
+  mapping.stop();
+}
+
+TEST_F(LoadedMapTest, GoesOnWithTheNextId) {
+  MappingComponent mapping(fake_);
+  mapping.start();
+  acknowledge_all();
+  send_keyframe(4, 0.9);
+  send_pose(1, 4);
+  EXPECT_EQ(mapping.mapper().map().keyframes().size(), 4U);
+  EXPECT_EQ(conversion::read_local_map(*maps().back()).reference_keyframe_id, 4U);
+  mapping.stop();
+}
+
+TEST_F(LoadedMapTest, GetsNoSecondMapBesideIt) {
+  MappingComponent mapping(fake_);
+  mapping.start();
+  acknowledge_all();
+  fake_.send<Keyframe>("keyframe", [&](Keyframe& message) {
+    auto stray = keyframe(4, 0.9);
+    stray.parent_id = 0;
+    ASSERT_TRUE(conversion::write_keyframe(stray, message));
+  });
+  send_pose(1, 4);
+  EXPECT_EQ(mapping.mapper().map().keyframes().size(), 3U);
+  EXPECT_THAT(log(), HasSubstr("keyframe 4 not taken: it is not tied to the loaded map"));
+  EXPECT_EQ(fake_.published<Progress>("progress").size(), 1U) << "the frame is answered anyway";
+  mapping.stop();
+}
+
+TEST_F(LoadedMapTest, StaysAsItIsForLocalisationOnly) {
+  fake_.set_parameter("localisation_only", true);
+  fake_.set_parameter("output_dir", folder_.string());
+  const auto before = bytes();
+  MappingComponent mapping(fake_);
+  mapping.start();
+  acknowledge_all();
+  send_keyframe(4, 0.9);
+  send_pose(1, 4);
+  send_correction(1, {{1, 0.0}, {2, 0.35}, {3, 0.7}});
+  send_pose(2, 3);
+  EXPECT_EQ(mapping.mapper().map().keyframes().size(), 3U);
+  EXPECT_EQ(mapping.mapper().epoch(), 7U);
+  EXPECT_EQ(conversion::read_local_map(*maps().back()).keyframes.size(), 3U);
+  mapping.stop();
+  EXPECT_EQ(bytes(), before);
+}
+
+TEST_F(LoadedMapTest, IsSavedAtTheEndAndOnRequest) {
+  fake_.set_parameter("output_dir", folder_.string());
+  fake_.set_parameter("save_map", false);
+  MappingComponent mapping(fake_);
+  mapping.start();
+  acknowledge_all();
+  send_keyframe(4, 0.9);
+  send_pose(1, 4);
+  const auto before = bytes();
+  EXPECT_TRUE(fake_.change_parameters({{"save_map", {true, {}}}}).empty());
+  const auto after = bytes();
+  EXPECT_NE(before, after);
+  std::filesystem::remove(file());
+  mapping.stop();
+  EXPECT_EQ(bytes(), after);
+  EXPECT_THAT(log(), HasSubstr("map of 4 keyframes"));
+}
+
+TEST_F(LoadedMapTest, IsRefusedWhenItIsBroken) {
+  std::filesystem::resize_file(file(), 1000);
+  MappingComponent mapping(fake_);
+  try {
+    mapping.start();
+    FAIL() << "taken";
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("map.mcap: the map cannot be loaded"));
+  }
+  EXPECT_TRUE(fake_.exit_requested());
+  EXPECT_TRUE(mapping.mapper().map().keyframes().empty());
+  EXPECT_TRUE(announced().empty());
 }
 
 }  // namespace

@@ -99,6 +99,19 @@ TEST_F(ResultsTest, TrajectoryFollowsTheMapAndOdometryDoesNot) {
   EXPECT_THAT(text("frames.csv"), HasSubstr("\n3,1700000000300000000,lost,1,0,0,0,0,123,"));
 }
 
+TEST_F(ResultsTest, FramesMayReferToALoadedMap) {
+  ResultsComponent results(fake_);
+  fake_.send<Keyframe>("map_keyframe", [](Keyframe& keyframe) {
+    keyframe.id(33);
+    keyframe.T_map_camera(conversion::to_array(camera_at(4.0)));
+  });
+  send_pose(1, 33, 0.0, 1.0);
+  results.stop();
+  const auto frames = trajectory::read_tum(folder_ / "trajectory.tum");
+  ASSERT_TRUE(frames.ok() && frames->size() == 1U);
+  EXPECT_NEAR((*frames)[0].T_world_body.translation().x(), 5.0, 1e-8);
+}
+
 TEST_F(ResultsTest, TimingIsTheStatisticsOfWhatComponentsReported) {
   ResultsComponent results(fake_);
   for (int i = 1; i <= 100; ++i) {

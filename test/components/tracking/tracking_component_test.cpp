@@ -220,6 +220,26 @@ TEST_F(TrackingComponentTest, BlackImageIsLostAndAsksNobodyUntilItSeesSomething)
 }
 
 /// With another wall in view the place is not known.
+TEST_F(TrackingComponentTest, WithALoadedMapItLooksForItsPlaceFirst) {
+  fake_.set_parameter("lockstep", true);
+  fake_.set_parameter("load_map", std::string("map.mcap"));
+  fake_.set_parameter("localisation_only", true);
+  start();
+  send(1, 0);
+  EXPECT_TRUE(poses().empty()) << "the map has not come";
+  fake_.send<msg::LocalMap>("local_map", [](msg::LocalMap& map) {
+    map.keyframe_ids()[0] = 5;
+    map.keyframe_poses()[0] = conversion::to_array(geometry::SE3());
+    map.keyframe_ids_count(1);
+    map.keyframe_poses_count(1);
+    map.next_keyframe_id(6);
+  });
+  ASSERT_EQ(poses().size(), 1U);
+  EXPECT_EQ(poses()[0]->state(), msg::TRACKING_LOST);
+  EXPECT_TRUE(fake_.published<msg::Keyframe>("keyframe").empty());
+  EXPECT_EQ(fake_.published<msg::Keyframe>("relocalisation_request").size(), 1U);
+}
+
 TEST_F(TrackingComponentTest, LockstepWaitsForTheAnswerToItsRequest) {
   fake_.set_parameter("lockstep", true);
   fake_.set_parameter("wait_for_map", false);

@@ -5,12 +5,14 @@
 #include <map>
 #include <memory>
 #include <set>
+#include <string>
 
 #include "camvox/component/component.hpp"
 #include "camvox/component/progress.hpp"
 #include "camvox/interfaces/camvox_interfaces.hpp"
 #include "camvox/mapping/mapper.hpp"
 #include "camvox/mapping_component/job_runner.hpp"
+#include "camvox/mapping_component/map_announcer.hpp"
 #include "camvox/sensors/camera_intrinsics.hpp"
 #include "camvox/tracking/frame_builder.hpp"
 
@@ -21,6 +23,13 @@ struct MappingComponentConfig {
   bool lockstep = false;  ///< Bundle adjustment before the answer, so that runs repeat bit by bit.
   /// In lockstep: a frame that made a keyframe is answered after loop closing has answered too.
   bool wait_for_loop_closing = false;
+  std::string output_dir;  ///< Folder to save the map in, as map.mcap; "" saves nothing.
+  /// Save it at the end. Set to true while running, it saves at once as well.
+  bool save_map = true;
+  std::string load_map;            ///< Map file to start with; "" starts an empty map.
+  bool localisation_only = false;  ///< The loaded map stays as it is.
+  /// What a keyframe may take, with the landmarks that it founded; more is reported.
+  int keyframe_budget_kb = 512;
   mapping::MappingConfig mapping;
   tracking::FrameBuilderConfig frame;  ///< As tracking's: the steps of the image pyramid.
   sensors::CameraIntrinsics camera;
@@ -29,6 +38,11 @@ struct MappingComponentConfig {
   static void visit(Self& self, Visitor&& field) {
     field("lockstep", self.lockstep);
     field("wait_for_loop_closing", self.wait_for_loop_closing);
+    field("output_dir", self.output_dir);
+    field("save_map", self.save_map);
+    field("load_map", self.load_map);
+    field("localisation_only", self.localisation_only);
+    field("keyframe_budget_kb", self.keyframe_budget_kb, config::at_least(1));
     field("mapping", self.mapping);
     field("frame", self.frame);
     field("camera", self.camera);
@@ -38,6 +52,10 @@ struct MappingComponentConfig {
 /// Owns the map (see mapping::Mapper). Answers the pose of every frame with the local map around
 /// its reference keyframe, and tells what changed. Live, bundle adjustment runs on a thread of its
 /// own: a new keyframe interrupts it, and the map that it made is sent when it is there.
+///
+/// A loaded map is announced to loop closing first, so that tracking (which has the parameter
+/// `load_map`, too) finds its place in it; keyframes that are not tied to it are refused, so that
+/// there is never a second map beside it. A map that cannot be loaded ends the run.
 class MappingComponent final : public Component {
  public:
   explicit MappingComponent(Context& context);
@@ -64,6 +82,10 @@ class MappingComponent final : public Component {
   void answer_ready();
   [[nodiscard]] bool is_ready(const Waiting& frame) const;
   void answer(const Waiting& frame);
+  void load();
+  void save();
+  void announce();
+  [[nodiscard]] std::string problem_with(const tracking::Keyframe& keyframe) const;
   void insert(const tracking::Keyframe& keyframe);
   void adjust(mapping::BundleJob job);
   void finish(const mapping::BundleJob& job,
@@ -73,6 +95,7 @@ class MappingComponent final : public Component {
   void publish_local_map(const Waiting& frame);
   void publish_update(const Header& header);
   void report();
+  void report_memory();
 
   Context& context_;
   MappingComponentConfig config_;
@@ -90,6 +113,7 @@ class MappingComponent final : public Component {
   std::uint64_t job_due_ = 0;  ///< Keyframe whose surroundings are to be adjusted; 0: none.
   bool full_due_ = false;      ///< The whole map is to be adjusted.
   std::uint64_t refused_ = 0;
+  mapping_component::MapAnnouncer announcer_;
   std::unique_ptr<mapping_component::JobRunner> runner_;
 };
 

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <string>
 
 #include "camvox/component/component.hpp"
 #include "camvox/component/progress.hpp"
@@ -25,6 +26,8 @@ struct TrackingComponentConfig {
   bool lockstep = false;
   bool wait_for_map = true;  ///< In lockstep; false where no mapping runs.
   bool use_imu = true;       ///< Wait for the cloud of a frame too: it brings the gyro's rotation.
+  std::string load_map;      ///< As mapping's: not "": find the place in that map first.
+  bool localisation_only = false;  ///< Make no keyframes: the map stays as it is.
   tracking::TrackerConfig tracker;
   tracking::FrameBuilderConfig frame;
   sensors::CameraIntrinsics camera;
@@ -35,6 +38,8 @@ struct TrackingComponentConfig {
     field("lockstep", self.lockstep);
     field("wait_for_map", self.wait_for_map);
     field("use_imu", self.use_imu);
+    field("load_map", self.load_map);
+    field("localisation_only", self.localisation_only);
     field("tracker", self.tracker);
     field("frame", self.frame);
     field("camera", self.camera);

@@ -56,6 +56,9 @@ class Map {
   /// All ids, ascending.
   [[nodiscard]] std::vector<LandmarkId> landmark_ids() const;
 
+  /// All keyframe ids, none before its parent in the spanning tree.
+  [[nodiscard]] std::vector<KeyframeId> parents_first() const;
+
   [[nodiscard]] const MapKeyframe* find_keyframe(KeyframeId id) const;
   [[nodiscard]] const MapLandmark* find_landmark(LandmarkId id) const;
   [[nodiscard]] const MapKeyframe& keyframe(KeyframeId id) const;
