@@ -42,13 +42,13 @@ class Failed(Exception):
 
 
 def camvox(*arguments, domain=None):
-    """Runs the command and gives its standard output."""
+    """Runs the command and gives what it logged."""
     environment = dict(os.environ, ROS_DOMAIN_ID=str(domain)) if domain else None
     command = [str(CAMVOX), *map(str, arguments)]
     done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
     if done.returncode != 0:
         raise Failed(f"{' '.join(command)}\n{done.stderr.strip()[-2000:]}")
-    return done.stdout
+    return done.stderr
 
 
 def recording(name):
@@ -67,12 +67,11 @@ def recording(name):
 
 
 def run(arguments, bag, out, *settings):
-    """One lockstep run of all components into `out`."""
-    camvox("run", ROOT / "config" / arguments.config, "--bag", bag, "--parameters",
-           bag / "rig.yaml", "--lockstep", "--out", out, "--overwrite",
-           *(part for setting in settings for part in ("--set", setting)),
-           domain=arguments.domain)
-    return out
+    """One lockstep run of all components into `out`; gives what they logged."""
+    return camvox("run", ROOT / "config" / arguments.config, "--bag", bag, "--parameters",
+                  bag / "rig.yaml", "--lockstep", "--out", out, "--overwrite",
+                  *(part for setting in settings for part in ("--set", setting)),
+                  domain=arguments.domain)
 
 
 def rows_of(path):
@@ -94,11 +93,11 @@ def evaluate(bag, out):
     return json.loads(file.read_text(encoding="utf-8"))
 
 
-def map_points(out):
-    """The number of landmarks in the saved map."""
-    found = re.search(r"landmark\S*\s*\|.*Count:\s*(\d+)", camvox("bag", "info", out / "map.mcap"))
+def map_points(log):
+    """The number of landmarks that mapping says it has saved."""
+    found = re.search(r"(\d+) landmarks saved", log)
     if not found:
-        raise Failed(f"{out}/map.mcap: no landmarks listed")
+        raise Failed("mapping did not say how many landmarks it saved")
     return int(found.group(1))
 
 
@@ -115,12 +114,12 @@ def close_depth(arguments, folder):
     """The paper's figure on the threshold of close points: matches of the first 100 frames."""
     bag, rows = recording(arguments.recordings[0]), []
     for threshold_m in (20, 50, 90, 130):
-        out = run(arguments, bag, folder / f"{threshold_m}",
-                  f"tracking.tracker.close_depth_m={threshold_m}")
-        matches = [int(row["matches"]) for row in rows_of(out / "frames.csv")[1:101]]
+        out = folder / f"{threshold_m}"
+        log = run(arguments, bag, out, f"tracking.tracker.close_depth_m={threshold_m}")
+        matches = [int(row["matches"]) for row in rows_of(out / "frames.csv")[2:102]]
         ape = evaluate(bag, out)["ape_m"]["rmse"]
         rows.append((threshold_m, f"{sum(matches) / len(matches):.1f}", min(matches),
-                     map_points(out), f"{ape:.3f}"))
+                     map_points(log), f"{ape:.3f}"))
     print(f"Close-depth threshold, {bag.name}\n")
     table(("close_depth_m", "matches a frame (first 100, mean)", "least", "map points (whole run)",
            "APE rmse (m)"), rows)
@@ -130,7 +129,8 @@ def accuracy(arguments, folder):
     rows = []
     for name in arguments.recordings:
         bag = recording(name)
-        out = run(arguments, bag, folder / bag.name)
+        out = folder / bag.name
+        run(arguments, bag, out)
         frames = rows_of(out / "frames.csv")
         tracked = sum(frame["state"] in TRACKED for frame in frames)
         figures = evaluate(bag, out)
@@ -147,7 +147,8 @@ def accuracy(arguments, folder):
 
 def timing(arguments, folder):
     bag = recording(arguments.recordings[0])
-    out = run(arguments, bag, folder / bag.name)
+    out = folder / bag.name
+    run(arguments, bag, out)
     ours = {row["component"]: row for row in rows_of(out / "timing.csv")}
     rows = []
     for name, paper_ms, components in PAPER_TIMING:
@@ -177,7 +178,8 @@ def yardstick(arguments, folder):
     """The run stands between two measurements of the yardstick on the same machine."""
     bag = recording(arguments.recordings[0])
     before_ms = orb_ms(arguments.images)
-    out = run(arguments, bag, folder / bag.name)
+    out = folder / bag.name
+    run(arguments, bag, out)
     after_ms = orb_ms(arguments.images)
     orb, rows = (before_ms + after_ms) / 2, []
     tracking = sorted(float(row["time_ms"]) for row in rows_of(out / "frames.csv")[1:])
@@ -198,7 +200,8 @@ def repeat(arguments, folder):
     files = ("trajectory.tum", "odometry.tum", "keyframes.tum", "map.mcap", "dense_map.ply")
     bag, rows, first, differ = recording(arguments.recordings[0]), [], None, 0
     for number in range(1, arguments.runs + 1):
-        out = run(arguments, bag, folder / "run")
+        out = folder / "run"
+        run(arguments, bag, out)
         now = digests(out, files)
         first = first or now
         differ += now != first
