@@ -17,6 +17,7 @@ CellGrid::CellGrid(int width_px, int height_px)
   starts_.resize(cells + 1);
   next_.resize(cells);
   for (auto& sums : sums_) sums.resize(cells);
+  nearest_.resize(cells);
 }
 
 void CellGrid::assign(const ProjectedPoints& points) {
@@ -33,7 +34,6 @@ void CellGrid::assign(const ProjectedPoints& points) {
   for (std::size_t i = 1; i < starts_.size(); ++i) starts_[i] += starts_[i - 1];
   std::copy(starts_.begin(), starts_.end() - 1, next_.begin());
   sorted_.resize(count);
-  hidden_.assign(count, 0);
   for (std::size_t i = 0; i < count; ++i) {
     const std::uint32_t place = next_[cell_of_[i]]++;
     sorted_.u_px[place] = points.u_px[i];
@@ -42,25 +42,66 @@ void CellGrid::assign(const ProjectedPoints& points) {
     sorted_.shift_u_px[place] = points.shift_u_px[i];
     sorted_.shift_v_px[place] = points.shift_v_px[i];
   }
-  for (auto& sums : sums_) std::fill(sums.begin(), sums.end(), 0.0);
-  for (std::size_t c = 0; c + 1 < starts_.size(); ++c) {
-    for (std::size_t i = starts_[c]; i < starts_[c + 1]; ++i) add(i, 1.0, c);
+  for (std::size_t c = 0; c + 1 < starts_.size(); ++c) sum(c);
+}
+
+CellGrid::Moments CellGrid::sum(const float* u_px,
+                                const float* v_px,
+                                const float* rho,
+                                std::size_t count) {
+  // One variable each: in an array they would go through memory with every return.
+  double su = 0.0, sv = 0.0, sr = 0.0, suu = 0.0, suv = 0.0, svv = 0.0, sur = 0.0, svr = 0.0,
+         srr = 0.0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double u = u_px[i];
+    const double v = v_px[i];
+    const double r = rho[i];
+    su += u;
+    sv += v;
+    sr += r;
+    suu += u * u;
+    suv += u * v;
+    svv += v * v;
+    sur += u * r;
+    svr += v * r;
+    srr += r * r;
   }
+  return {static_cast<double>(count), su, sv, sr, suu, suv, svv, sur, svr, srr};
 }
 
-void CellGrid::add(std::size_t point, double sign, std::size_t cell) {
-  const double u = sorted_.u_px[point];
-  const double v = sorted_.v_px[point];
-  const double r = sorted_.rho[point];
-  const double values[kMoments] = {1.0, u, v, r, u * u, u * v, v * v, u * r, v * r, r * r};
-  for (std::size_t m = 0; m < kMoments; ++m) sums_[m][cell] += sign * values[m];
+void CellGrid::sum(std::size_t cell) {
+  const std::size_t first = starts_[cell];
+  const std::size_t count = starts_[cell + 1] - first;
+  const Moments moments = sum(
+      sorted_.u_px.data() + first, sorted_.v_px.data() + first, sorted_.rho.data() + first, count);
+  for (std::size_t m = 0; m < kMoments; ++m) sums_[m][cell] = moments[m];
+  float nearest = 0.0F;
+  for (std::size_t i = first; i < first + count; ++i) nearest = std::max(nearest, sorted_.rho[i]);
+  nearest_[cell] = nearest;
 }
 
-void CellGrid::hide(std::size_t point) {
-  if (hidden_[point] != 0) return;
-  hidden_[point] = 1;
-  const auto place = std::upper_bound(starts_.begin(), starts_.end(), point);
-  add(point, -1.0, static_cast<std::size_t>(place - starts_.begin()) - 1);
+std::vector<std::size_t> CellGrid::remove(std::span<const std::uint8_t> removed) {
+  std::vector<std::size_t> changed;
+  std::uint32_t kept = 0;
+  std::uint32_t begin = 0;
+  for (std::size_t c = 0; c + 1 < starts_.size(); ++c) {
+    const std::uint32_t end = starts_[c + 1];
+    const std::uint32_t start = kept;
+    for (std::uint32_t i = begin; i < end; ++i) {
+      for (auto* list : sorted_.lists()) (*list)[kept] = (*list)[i];
+      kept += static_cast<std::uint32_t>(removed[i] == 0);
+    }
+    starts_[c] = start;
+    if (kept - start != end - begin) {
+      starts_[c + 1] = kept;
+      sum(c);
+      changed.push_back(c);
+    }
+    begin = end;
+  }
+  starts_.back() = kept;
+  sorted_.resize(kept);
+  return changed;
 }
 
 CellGrid::Moments CellGrid::window(std::size_t cell, int radius) const {

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "point_projection.hpp"
@@ -23,14 +24,18 @@ class CellGrid {
   enum Moment : std::size_t { kN, kU, kV, kR, kUU, kUV, kVV, kUR, kVR, kRR, kMoments };
   using Moments = std::array<double, kMoments>;
 
+  /// The sums over `count` returns.
+  [[nodiscard]] static Moments sum(const float* u_px,
+                                   const float* v_px,
+                                   const float* rho,
+                                   std::size_t count);
+
   CellGrid(int width_px, int height_px);
 
-  /// Sorts the returns; none is hidden.
   void assign(const ProjectedPoints& points);
 
-  /// Takes a return out of the sums, from now on.
-  void hide(std::size_t point);
-  [[nodiscard]] bool is_hidden(std::size_t point) const { return hidden_[point] != 0; }
+  /// Takes returns out (`removed`: one entry a return, 0: stays). Returns the cells they were in.
+  std::vector<std::size_t> remove(std::span<const std::uint8_t> removed);
 
   [[nodiscard]] int columns() const { return columns_; }
   [[nodiscard]] int rows() const { return rows_; }
@@ -42,13 +47,28 @@ class CellGrid {
   [[nodiscard]] std::size_t begin(std::size_t cell) const { return starts_[cell]; }
   [[nodiscard]] std::size_t end(std::size_t cell) const { return starts_[cell + 1]; }
 
+  /// Returns in the cells at most `radius` away; the caller stays that far from the border.
+  [[nodiscard]] std::size_t count(std::size_t cell, std::size_t radius) const {
+    const std::size_t way = radius * static_cast<std::size_t>(columns_);
+    std::size_t count = 0;
+    for (std::size_t c = cell - way; c <= cell + way; c += static_cast<std::size_t>(columns_)) {
+      count += starts_[c + radius + 1] - starts_[c - radius];
+    }
+    return count;
+  }
+  [[nodiscard]] bool has_returns(int row) const {
+    return begin(cell(0, row)) != end(cell(columns_ - 1, row));
+  }
+
   [[nodiscard]] const ProjectedPoints& points() const { return sorted_; }
   [[nodiscard]] const double* sums(Moment moment) const { return sums_[moment].data(); }
   /// Sums over the cells at most `radius` away; the caller stays that far from the border.
   [[nodiscard]] Moments window(std::size_t cell, int radius) const;
+  /// Largest inverse depth of a cell's returns; 0: it has none.
+  [[nodiscard]] float nearest(std::size_t cell) const { return nearest_[cell]; }
 
  private:
-  void add(std::size_t point, double sign, std::size_t cell);
+  void sum(std::size_t cell);
 
   int columns_;
   int rows_;
@@ -56,8 +76,8 @@ class CellGrid {
   std::vector<std::uint32_t> starts_;   ///< First return of every cell, and the end.
   std::vector<std::uint32_t> next_;
   ProjectedPoints sorted_;
-  std::vector<std::uint8_t> hidden_;
   std::array<std::vector<double>, kMoments> sums_;
+  std::vector<float> nearest_;
 };
 
 }  // namespace camvox::depth

@@ -4,7 +4,9 @@
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
+#include <vector>
 
+#include "camvox/config/target_clones.hpp"
 #include "cell_grid.hpp"
 #include "hidden_returns.hpp"
 #include "mixed_cell.hpp"
@@ -48,16 +50,26 @@ struct Block {
   int height;
 };
 
+CAMVOX_ALWAYS_INLINE void write_plane_row(
+    const CellPlane& plane, int v, int width, float* depth_m, float* sigma_m) {
+  const float rho_row = plane.rho + plane.slope_v * (static_cast<float>(v) - 0.5F * (kCell - 1));
+  for (int u = 0; u < width; ++u) {
+    const float rho = rho_row + plane.slope_u * (static_cast<float>(u) - 0.5F * (kCell - 1));
+    const float z = 1.0F / rho;
+    depth_m[u] = z;
+    sigma_m[u] = plane.sigma_rho * z * z;
+  }
+}
+
+CAMVOX_TARGET_CLONES
 void write_plane(const CellPlane& plane, const Block& block) {
   for (int v = 0; v < block.height; ++v) {
-    const float rho_row = plane.rho + plane.slope_v * (static_cast<float>(v) - 0.5F * (kCell - 1));
     float* depth_m = block.depth_m + static_cast<std::size_t>(v) * block.stride;
     float* sigma_m = block.sigma_m + static_cast<std::size_t>(v) * block.stride;
-    for (int u = 0; u < block.width; ++u) {
-      const float rho = rho_row + plane.slope_u * (static_cast<float>(u) - 0.5F * (kCell - 1));
-      const float z = 1.0F / rho;
-      depth_m[u] = z;
-      sigma_m[u] = plane.sigma_rho * z * z;
+    if (block.width == kCell) {  // With a length that the compiler knows it is a few instructions.
+      write_plane_row(plane, v, kCell, depth_m, sigma_m);
+    } else {
+      write_plane_row(plane, v, block.width, depth_m, sigma_m);
     }
   }
 }
@@ -65,13 +77,12 @@ void write_plane(const CellPlane& plane, const Block& block) {
 std::size_t write_pixels(const CellPixels& pixels, const Block& block) {
   std::size_t filled = 0;
   for (int v = 0; v < block.height; ++v) {
-    for (int u = 0; u < block.width; ++u) {
-      const auto from = static_cast<std::size_t>(v * kCell + u);
-      const auto to = static_cast<std::size_t>(v) * block.stride + static_cast<std::size_t>(u);
-      block.depth_m[to] = pixels.depth_m[from];
-      block.sigma_m[to] = pixels.sigma_m[from];
-      filled += static_cast<std::size_t>(pixels.depth_m[from] > 0.0F);
-    }
+    const auto to = static_cast<std::size_t>(v) * block.stride;
+    const float* depth_m = &pixels.depth_m[static_cast<std::size_t>(v * kCell)];
+    const float* sigma_m = &pixels.sigma_m[static_cast<std::size_t>(v * kCell)];
+    std::copy(depth_m, depth_m + block.width, block.depth_m + to);
+    std::copy(sigma_m, sigma_m + block.width, block.sigma_m + to);
+    for (int u = 0; u < block.width; ++u) filled += static_cast<std::size_t>(depth_m[u] > 0.0F);
   }
   return filled;
 }
@@ -100,6 +111,10 @@ struct DepthProjector::Implementation {
     std::size_t filled = 0;
     const auto stride = static_cast<std::size_t>(width_px);
     for (int row = kMargin; row < grid.rows() - kMargin; ++row) {
+      const auto first = static_cast<std::size_t>((row - kMargin) * kCell) * stride;
+      const std::size_t length = std::min(kCell * stride, depth_m.size() - first);
+      std::fill_n(&depth_m[first], length, 0.0F);
+      std::fill_n(&sigma_m[first], length, 0.0F);
       for (int column = kMargin; column < grid.columns() - kMargin; ++column) {
         const int u = (column - kMargin) * kCell;
         const int v = (row - kMargin) * kCell;
@@ -113,8 +128,7 @@ struct DepthProjector::Implementation {
         if (planes.kind(cell) == CellKind::kPlane && is_usable(planes.plane(cell))) {
           write_plane(planes.plane(cell), block);
           filled += static_cast<std::size_t>(block.width * block.height);
-        } else {
-          filler.fill(grid, planes, column, row, pixels);
+        } else if (filler.fill(grid, planes, column, row, pixels)) {
           filled += write_pixels(pixels, block);
         }
       }
@@ -130,6 +144,7 @@ struct DepthProjector::Implementation {
   CellGrid grid;
   PlaneMap planes;
   ProjectedPoints points;
+  std::vector<std::uint8_t> hidden;
 };
 
 DepthProjector::DepthProjector(const sensors::CameraModel& camera,
@@ -160,8 +175,10 @@ ProjectionReport DepthProjector::project(std::span<const ScanView> scans,
   self.grid.assign(self.points);
   self.planes.fit(self.grid, self.noise);
   const OcclusionRule rule{.surface_gap = static_cast<float>(self.config.surface_gap)};
-  report.hidden = hide_returns(self.planes, rule, self.grid);
-  if (report.hidden > 0) self.planes.fit(self.grid, self.noise);
+  report.hidden = find_hidden(self.planes, rule, self.grid, self.hidden);
+  if (report.hidden > 0) {
+    self.planes.refit(self.grid, self.noise, self.grid.remove(self.hidden));
+  }
   self.planes.drop_unsupported(self.grid);
   report.filled_px = self.write(depth_m, sigma_m);
   return report;

@@ -17,12 +17,13 @@ bool hides(const ProjectedPoints& points,
            float footprint_px,
            float surface_gap) {
   if (points.rho[near] * (1.0F - surface_gap) <= points.rho[far]) return false;
+  const float du = points.u_px[far] - points.u_px[near];
+  const float dv = points.v_px[far] - points.v_px[near];
+  if (du * du + dv * dv > 2.0F * footprint_px * footprint_px) return false;
   const float shift_u = points.shift_u_px[far] - points.shift_u_px[near];
   const float shift_v = points.shift_v_px[far] - points.shift_v_px[near];
   const float shift2 = shift_u * shift_u + shift_v * shift_v;
   if (shift2 < kLeastShift_px * kLeastShift_px) return false;
-  const float du = points.u_px[far] - points.u_px[near];
-  const float dv = points.v_px[far] - points.v_px[near];
   const float along_times_shift = du * shift_u + dv * shift_v;
   // Before the change of view it was at along - shift: on the other side if that is negative.
   if (along_times_shift <= 0.0F || along_times_shift >= shift2) return false;
@@ -32,32 +33,53 @@ bool hides(const ProjectedPoints& points,
          across_times_shift * across_times_shift <= limit2;
 }
 
+/// Inverse depth of the nearest return in the cells around.
+float nearest_around(const CellGrid& grid, std::size_t cell) {
+  const auto stride = static_cast<std::size_t>(grid.columns());
+  float nearest = 0.0F;
+  for (std::size_t c = cell - stride; c <= cell + stride; c += stride) {
+    nearest = std::max({nearest, grid.nearest(c - 1), grid.nearest(c), grid.nearest(c + 1)});
+  }
+  return nearest;
+}
+
 }  // namespace
 
-std::size_t hide_returns(const PlaneMap& planes, const OcclusionRule& rule, CellGrid& grid) {
+std::size_t find_hidden(const PlaneMap& planes,
+                        const OcclusionRule& rule,
+                        const CellGrid& grid,
+                        std::vector<std::uint8_t>& hidden) {
   const ProjectedPoints& points = grid.points();
   const auto stride = static_cast<std::size_t>(grid.columns());
-  std::vector<std::size_t> hidden;
+  hidden.assign(points.size(), 0);
+  std::size_t count = 0;
+  const auto is_hidden = [&](std::size_t far, std::size_t cell, float footprint_px) {
+    for (std::size_t row = cell - stride; row <= cell + stride; row += stride) {
+      for (std::size_t c = row - 1; c <= row + 1; ++c) {
+        if (grid.nearest(c) * (1.0F - rule.surface_gap) <= points.rho[far]) continue;
+        for (std::size_t near = grid.begin(c); near < grid.end(c); ++near) {
+          if (hides(points, near, far, footprint_px, rule.surface_gap)) return true;
+        }
+      }
+    }
+    return false;
+  };
   for (int row = kMargin; row < grid.rows() - kMargin; ++row) {
     for (int column = kMargin; column < grid.columns() - kMargin; ++column) {
       const std::size_t cell = grid.cell(column, row);
       if (planes.kind(cell) == CellKind::kPlane || grid.begin(cell) == grid.end(cell)) continue;
-      const auto window = static_cast<float>(grid.window(cell, 1)[CellGrid::kN]);
+      const float bound = nearest_around(grid, cell) * (1.0F - rule.surface_gap);
+      const auto window = static_cast<float>(grid.count(cell, 1));
       const float footprint = std::clamp(
           3.0F * kCell / std::sqrt(window), rule.least_footprint_px, rule.most_footprint_px);
       for (std::size_t far = grid.begin(cell); far < grid.end(cell); ++far) {
-        bool found = false;
-        for (std::size_t c = cell - stride; c <= cell + stride && !found; c += stride) {
-          for (std::size_t near = grid.begin(c - 1); near < grid.end(c + 1) && !found; ++near) {
-            found = hides(points, near, far, footprint, rule.surface_gap);
-          }
-        }
-        if (found) hidden.push_back(far);
+        if (points.rho[far] >= bound || !is_hidden(far, cell, footprint)) continue;
+        hidden[far] = 1;
+        ++count;
       }
     }
   }
-  for (const std::size_t point : hidden) grid.hide(point);  // At once: order must not matter.
-  return hidden.size();
+  return count;
 }
 
 }  // namespace camvox::depth

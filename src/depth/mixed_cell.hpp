@@ -2,7 +2,7 @@
 
 #include <array>
 #include <cstddef>
-#include <vector>
+#include <cstdint>
 
 #include "cell_grid.hpp"
 #include "plane_map.hpp"
@@ -25,19 +25,43 @@ struct CellPixels {
 };
 
 /// Fills cells return by return: sorts the returns around a cell into surfaces, then lets every
-/// pixel decide for the surface of its nearest return. Keeps its working memory.
+/// pixel decide for the surface of its nearest return. Keeps its working memory, which has a fixed
+/// size: thousands of cells an image leave no time for more.
 class MixedCellFiller {
  public:
   MixedCellFiller(const MixedCellRule& rule, const NoiseModel& noise)
       : rule_(rule), noise_(noise) {}
 
-  void fill(const CellGrid& grid, const PlaneMap& planes, int column, int row, CellPixels& pixels);
+  /// Returns whether any pixel has depth; else `pixels` is not written. No return in the cell and
+  /// beside it: no depth.
+  [[nodiscard]] bool fill(
+      const CellGrid& grid, const PlaneMap& planes, int column, int row, CellPixels& pixels);
 
  private:
-  struct Return {
-    float u_px;
-    float v_px;
-    float rho;
+  /// Returns that are looked at for one cell; of more, every second, third...
+  static constexpr std::size_t kMostReturns = 64;
+  /// Offsets from the cell's middle and inverse depth, a list for each.
+  struct Returns {
+    alignas(64) std::array<float, kMostReturns> u_px;
+    alignas(64) std::array<float, kMostReturns> v_px;
+    alignas(64) std::array<float, kMostReturns> rho;
+    std::size_t count = 0;
+
+    void set(std::size_t at, const Returns& from, std::size_t i) {
+      u_px[at] = from.u_px[i];
+      v_px[at] = from.v_px[i];
+      rho[at] = from.rho[i];
+    }
+  };
+  /// A neighbour's plane, at the middle of this cell, and which returns it explains, one bit each.
+  struct Hypothesis {
+    CellPlane plane;
+    float bound;
+    std::uint64_t inliers;
+  };
+  struct Hypotheses {
+    std::array<Hypothesis, 8> list;
+    std::size_t count = 0;
   };
   /// A surface: the returns begin to end of `sorted_`, and the plane through them. Without a plane
   /// it gives no depth, but keeps others away.
@@ -53,15 +77,22 @@ class MixedCellFiller {
   struct Nearest;
 
   void gather(const CellGrid& grid, std::size_t cell);
+  void gather(const CellGrid& grid, std::size_t cell, std::size_t radius, std::size_t step);
   void split(const PlaneMap& planes, std::size_t cell, int columns);
-  [[nodiscard]] std::size_t take_best_plane(const PlaneMap& planes, std::size_t cell, int columns);
-  void split_by_gaps(std::size_t begin);
+  void propose(const PlaneMap& planes, std::size_t cell, int columns, Hypotheses& hypotheses) const;
+  static void explain(Returns& returns, Hypotheses& hypotheses);
+  using Keys = std::array<std::int32_t, kMostReturns>;
+  static void rank(Keys& keys, std::size_t count, Keys& ranks);
+  void split_by_gaps(std::uint64_t left);
   void add_cluster(std::size_t begin, std::size_t end);
-  void add_surface(std::size_t begin, std::size_t end, const CellPlane* known);
-  void measure(const Surface& surface, Distances& distances) const;
+  bool add_surface(std::size_t begin, std::size_t end, const CellPlane* known);
+  Surface& add(std::size_t begin, std::size_t end, const CellPlane& plane, float reach_px);
+  [[nodiscard]] bool find_octagon(Surface& surface) const;
+  static void measure(const Returns& returns, const Surface& surface, Distances& distances);
   static void merge(const Surface& surface, const Distances& distances, Nearest& nearest);
-  void decide(const Nearest& nearest, CellPixels& pixels) const;
-  void add_octagon(Surface surface);
+  [[nodiscard]] bool decide(const Nearest& nearest, CellPixels& pixels) const;
+  /// Of inverse depth: from the range, and from the direction, too.
+  [[nodiscard]] float range_sigma(float rho) const;
   [[nodiscard]] float noise_sigma(float rho, float slope2) const;
 
   MixedCellRule rule_;
@@ -70,9 +101,11 @@ class MixedCellFiller {
   float v_middle_ = 0.0F;
   float cosine_ = 1.0F;
   float reach_px_ = 0.0F;
-  std::vector<Return> sorted_;
-  std::vector<Return> rest_;
-  std::vector<Surface> surfaces_;
+  Returns returns_;  ///< As gathered.
+  Returns sorted_;   ///< By surface.
+  std::array<Surface, kMostReturns> surfaces_;
+  std::size_t surface_count_ = 0;
+  bool gives_depth_ = false;  ///< One of the surfaces might, in this cell.
 };
 
 }  // namespace camvox::depth

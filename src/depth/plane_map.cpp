@@ -14,9 +14,9 @@ constexpr double kLeastReturnsAlone = 8.0;
 /// returns: returns on half of the window only have it at 1.7.
 constexpr double kMostOffCentre2 = 1.0;
 
-/// A plane cell with no, one, or more returns of its own has at most so many cells without a plane
-/// among the nine around and with it.
-constexpr std::array<int, 3> kMostMixed = {3, 4, 6};
+/// Of a cell with a plane and no, one, or more returns of its own, and its eight neighbours, at
+/// least so many have a plane.
+constexpr std::array<int, 3> kLeastPlanes = {6, 5, 3};
 
 using Moment = CellGrid::Moment;
 
@@ -37,10 +37,12 @@ CellPlane to_plane(const PlaneFit& fit) {
 struct PlaneMap::Row {
   explicit Row(std::size_t columns) {
     for (auto& list : window) list.resize(columns);
+    column.resize(columns);
     planes.resize(columns);
     accepted.resize(columns);
   }
   std::array<std::vector<double>, CellGrid::kMoments> window;
+  std::vector<double> column;  ///< Sums over three cells, one above the other.
   std::vector<CellPlane> planes;
   std::vector<int> accepted;
 };
@@ -63,7 +65,10 @@ PlaneMap::PlaneMap(const sensors::CameraModel& camera) {
 }
 
 CAMVOX_TARGET_CLONES
-void PlaneMap::fit_row(const CellGrid& grid, int row, const NoiseModel& noise, Row& fits) const {
+void PlaneMap::fit_windows(const CellGrid& grid,
+                           int row,
+                           const NoiseModel& noise,
+                           Row& fits) const {
   const auto stride = static_cast<std::size_t>(columns_);
   const std::size_t first = grid.cell(0, row);
   for (std::size_t m = 0; m < CellGrid::kMoments; ++m) {
@@ -71,10 +76,9 @@ void PlaneMap::fit_row(const CellGrid& grid, int row, const NoiseModel& noise, R
     const double* above = centre - stride;
     const double* below = centre + stride;
     double* window = fits.window[m].data();
-    for (std::size_t c = 1; c + 1 < stride; ++c) {
-      window[c] = above[c - 1] + above[c] + above[c + 1] + centre[c - 1] + centre[c] +
-                  centre[c + 1] + below[c - 1] + below[c] + below[c + 1];
-    }
+    double* three = fits.column.data();
+    for (std::size_t c = 0; c < stride; ++c) three[c] = above[c] + centre[c] + below[c];
+    for (std::size_t c = 1; c + 1 < stride; ++c) window[c] = three[c - 1] + three[c] + three[c + 1];
   }
   const NoiseModel local = noise;
   const double v_c = middle_px(row);
@@ -109,37 +113,68 @@ bool PlaneMap::try_cell_alone(const CellGrid& grid, int column, int row, const N
   return true;
 }
 
+void PlaneMap::fit_row(const CellGrid& grid, int row, const NoiseModel& noise, Row& fits) {
+  fit_windows(grid, row, noise, fits);
+  for (int column = kMargin; column < columns_ - kMargin; ++column) {
+    const std::size_t cell = grid.cell(column, row);
+    const auto i = static_cast<std::size_t>(column);
+    planes_[cell] = fits.planes[i];
+    const bool plane = fits.accepted[i] != 0 || try_cell_alone(grid, column, row, noise);
+    kinds_[cell] = plane ? CellKind::kPlane : CellKind::kMixed;
+  }
+}
+
 void PlaneMap::fit(const CellGrid& grid, const NoiseModel& noise) {
   Row fits(static_cast<std::size_t>(columns_));
   for (int row = kMargin; row < rows_ - kMargin; ++row) {
-    fit_row(grid, row, noise, fits);
+    if (grid.has_returns(row - 1) || grid.has_returns(row) || grid.has_returns(row + 1)) {
+      fit_row(grid, row, noise, fits);
+    } else {
+      const auto first = kinds_.begin() + static_cast<std::ptrdiff_t>(grid.cell(0, row));
+      std::fill(first, first + columns_, CellKind::kMixed);
+    }
+  }
+}
+
+void PlaneMap::refit_cell(const CellGrid& grid, int column, int row, const NoiseModel& noise) {
+  const std::size_t cell = grid.cell(column, row);
+  const auto moments = grid.window(cell, 1);
+  const PlaneFit fit =
+      fit_plane(moments.data(), middle_px(column), middle_px(row), cosines_[cell], noise);
+  planes_[cell] = to_plane(fit);
+  const bool plane = is_plane(fit, kLeastReturns) || try_cell_alone(grid, column, row, noise);
+  kinds_[cell] = plane ? CellKind::kPlane : CellKind::kMixed;
+}
+
+void PlaneMap::refit(const CellGrid& grid,
+                     const NoiseModel& noise,
+                     std::span<const std::size_t> changed) {
+  // They lie in the image, so what is around them is within the margin.
+  to_refit_.assign(kinds_.size(), 0);
+  const auto stride = static_cast<std::size_t>(columns_);
+  for (const std::size_t cell : changed) {
+    for (std::size_t c = cell - stride; c <= cell + stride; c += stride) {
+      to_refit_[c - 1] = to_refit_[c] = to_refit_[c + 1] = 1;
+    }
+  }
+  for (int row = kMargin; row < rows_ - kMargin; ++row) {
     for (int column = kMargin; column < columns_ - kMargin; ++column) {
-      const std::size_t cell = grid.cell(column, row);
-      const auto i = static_cast<std::size_t>(column);
-      planes_[cell] = fits.planes[i];
-      const bool plane = fits.accepted[i] != 0 || try_cell_alone(grid, column, row, noise);
-      kinds_[cell] = plane ? CellKind::kPlane : CellKind::kMixed;
+      if (to_refit_[grid.cell(column, row)] != 0) refit_cell(grid, column, row, noise);
     }
   }
 }
 
 void PlaneMap::drop_unsupported(const CellGrid& grid) {
-  kinds_before_ = kinds_;
+  unsupported_.clear();
   for (int row = kMargin; row < rows_ - kMargin; ++row) {
     for (int column = kMargin; column < columns_ - kMargin; ++column) {
       const std::size_t cell = grid.cell(column, row);
-      if (kinds_before_[cell] != CellKind::kPlane) continue;
-      int mixed = 0;
-      for (int dy = -1; dy <= 1; ++dy) {
-        for (int dx = -1; dx <= 1; ++dx) {
-          const CellKind other = kinds_before_[grid.cell(column + dx, row + dy)];
-          mixed += static_cast<int>(other == CellKind::kMixed);
-        }
-      }
-      const double own = std::clamp(grid.sums(CellGrid::kN)[cell], 0.0, 2.0);
-      if (mixed > kMostMixed[static_cast<std::size_t>(own)]) kinds_[cell] = CellKind::kMixed;
+      if (kinds_[cell] != CellKind::kPlane) continue;
+      const std::size_t own = std::min<std::size_t>(grid.count(cell, 0), 2);
+      if (count_around(cell) < kLeastPlanes[own]) unsupported_.push_back(cell);
     }
   }
+  for (const std::size_t cell : unsupported_) kinds_[cell] = CellKind::kMixed;  // At once.
 }
 
 }  // namespace camvox::depth

@@ -31,6 +31,8 @@ class PlaneMap {
 
   /// Fits all cells.
   void fit(const CellGrid& grid, const NoiseModel& noise);
+  /// Fits those again that the returns of `changed` cells count for.
+  void refit(const CellGrid& grid, const NoiseModel& noise, std::span<const std::size_t> changed);
 
   /// Takes the plane from cells that stand in for a gap in the scan: few returns of their own, and
   /// neighbours without a plane. What lies in such a gap is often nearer, and not to be seen
@@ -39,6 +41,18 @@ class PlaneMap {
 
   [[nodiscard]] CellKind kind(std::size_t cell) const { return kinds_[cell]; }
   [[nodiscard]] const CellPlane& plane(std::size_t cell) const { return planes_[cell]; }
+
+  /// How many of the cell and its neighbours have a plane.
+  [[nodiscard]] int count_around(std::size_t cell) const {
+    const auto stride = static_cast<std::size_t>(columns_);
+    int count = 0;
+    for (std::size_t row = cell - stride; row <= cell + stride; row += stride) {
+      for (std::size_t c = row - 1; c <= row + 1; ++c) {
+        count += static_cast<int>(kinds_[c] == CellKind::kPlane);
+      }
+    }
+    return count;
+  }
 
   /// Middle of a column or row of cells, and the cosine of a cell's direction to the optical axis.
   [[nodiscard]] static float middle_px(int column_or_row) {
@@ -49,14 +63,17 @@ class PlaneMap {
  private:
   /// The fits of one row of cells, a list for each field of PlaneFit that is looked at.
   struct Row;
-  void fit_row(const CellGrid& grid, int row, const NoiseModel& noise, Row& fits) const;
+  void fit_row(const CellGrid& grid, int row, const NoiseModel& noise, Row& fits);
+  void fit_windows(const CellGrid& grid, int row, const NoiseModel& noise, Row& fits) const;
+  void refit_cell(const CellGrid& grid, int column, int row, const NoiseModel& noise);
   [[nodiscard]] bool try_cell_alone(const CellGrid& grid, int column, int row, const NoiseModel&);
 
   int columns_;
   int rows_;
   std::vector<float> cosines_;
   std::vector<CellKind> kinds_;
-  std::vector<CellKind> kinds_before_;
+  std::vector<std::size_t> unsupported_;
+  std::vector<std::uint8_t> to_refit_;
   std::vector<CellPlane> planes_;
 };
 

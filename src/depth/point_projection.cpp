@@ -41,7 +41,7 @@ double largest_radius2(const sensors::CameraModel& camera, double margin_px) {
 }  // namespace
 
 void ProjectedPoints::resize(std::size_t count) {
-  for (auto* list : {&u_px, &v_px, &rho, &shift_u_px, &shift_v_px}) list->resize(count);
+  for (auto* list : lists()) list->resize(count);
 }
 
 struct PointProjection::Block {

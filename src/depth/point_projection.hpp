@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <span>
 #include <vector>
@@ -18,6 +19,9 @@ struct ProjectedPoints {
   std::vector<float> shift_v_px;  ///< same axes at the lidar: how much the change of view moves it.
 
   [[nodiscard]] std::size_t size() const { return u_px.size(); }
+  [[nodiscard]] std::array<std::vector<float>*, 5> lists() {
+    return {&u_px, &v_px, &rho, &shift_u_px, &shift_v_px};
+  }
   void resize(std::size_t count);
 };
 
