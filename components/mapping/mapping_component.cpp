@@ -101,9 +101,10 @@ void MappingComponent::save() {
   const auto path = std::filesystem::path(config_.output_dir) / "map.mcap";
   const auto status = mapping::save_map(path, map, mapper_.epoch(), mapper_.model().camera());
   if (!status.ok()) return context_.log().error("{}", status.message());
-  context_.log().info("map of {} keyframes, {} landmarks saved to {}",
+  context_.log().info("map of {} keyframes, {} landmarks ({:.1f} MB) saved to {}",
                       map.keyframes().size(),
                       map.landmark_count(),
+                      1e-6 * static_cast<double>(map.memory_bytes()),
                       path.string());
 }
 

@@ -1,9 +1,11 @@
 #include "camvox/mapping/mapper.hpp"
 
 #include <gtest/gtest.h>
+#include <malloc.h>
 
 #include <cmath>
 #include <cstring>
+#include <memory>
 #include <numeric>
 #include <string>
 #include <vector>
@@ -163,6 +165,28 @@ TEST(MapperTest, RevisitsDoNotGrowTheMap) {
   EXPECT_LE(mapper.map().keyframes().size(), after_first_lap + 4);
   EXPECT_NE(mapper.map().find_keyframe(1), nullptr);
   EXPECT_FALSE(mapper.take_changes().removed.empty());
+}
+
+// What diagnostics show must be what the heap gives; and with the features of the paper's camera a
+// keyframe stays within MappingComponentConfig::keyframe_budget_kb.
+TEST(MapperTest, TakesTheMemoryThatItSays) {
+  MappingWorld world({.points = 6000});
+  const Mapper mapper = drive(world, 12);
+  const auto& map = mapper.map();
+  std::size_t features = 0;
+  for (const auto& [id, keyframe] : map.keyframes()) features += keyframe.frame.features.size();
+  EXPECT_GT(features, 1500U * map.keyframes().size());
+  const auto keyframe_bytes = map.memory_bytes() / map.keyframes().size();
+  EXPECT_LT(keyframe_bytes, 512U * 1024U) << features / map.keyframes().size() << " features";
+  const auto in_use = [] {
+    const auto info = mallinfo2();
+    return info.uordblks + info.hblkhd;
+  };
+  const auto before = in_use();
+  const auto copy = std::make_unique<Map>(map);
+  const auto taken = in_use() - before;
+  if (taken == 0) GTEST_SKIP() << "this allocator does not count";
+  EXPECT_NEAR(static_cast<double>(map.memory_bytes()) / static_cast<double>(taken), 1.0, 0.25);
 }
 
 TEST(MapperTest, InterruptedOrOutdatedBundlesAreSafe) {
