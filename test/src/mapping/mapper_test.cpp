@@ -167,6 +167,28 @@ TEST(MapperTest, RevisitsDoNotGrowTheMap) {
   EXPECT_FALSE(mapper.take_changes().removed.empty());
 }
 
+// Nothing is recognised, as if all looked different each time: no keyframe is ever redundant.
+TEST(MapperTest, APlaceThatAlwaysLooksDifferentDoesNotGrowTheMap) {
+  MappingWorld world({.points = 600, .length_m = 25.0});
+  MappingConfig config;
+  config.place_keyframes = 5;
+  Mapper mapper(config, world.camera());
+  std::vector<KeyframeId> removed;
+  for (KeyframeId i = 0; i < 24; ++i) {
+    const double z_m = 0.05 * static_cast<double>(i % 4);
+    mapper.process(world.look(MappingWorld::on_street(z_m), mapper, i + 1));
+    const auto gone = mapper.take_changes().removed;
+    removed.insert(removed.end(), gone.begin(), gone.end());
+    // The root, and the three newest, may come on top.
+    ASSERT_LE(mapper.map().keyframes().size(), 5U + 4U) << i;
+  }
+  mapper.map().check_consistency();
+  EXPECT_GE(removed.size(), 24U - 9U);
+  EXPECT_NE(mapper.map().find_keyframe(1), nullptr);
+  mapper.process(world.look(MappingWorld::on_street(15.0), mapper));
+  EXPECT_NE(mapper.map().find_keyframe(25), nullptr) << "another place has room";
+}
+
 // What diagnostics show must be what the heap gives; and with the features of the paper's camera a
 // keyframe stays within MappingComponentConfig::keyframe_budget_kb.
 TEST(MapperTest, TakesTheMemoryThatItSays) {

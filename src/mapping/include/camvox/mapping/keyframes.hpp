@@ -14,8 +14,10 @@ namespace camvox::mapping {
 
 /// Drops neighbours of `id` that are redundant: of their points (with depth, if any has) more than
 /// `max_redundancy` are seen by `redundancy_observers` others at the same or a finer scale. Old
-/// neighbours count as well, so that going the same way again does not grow the map. Keeps the
-/// root, `id` and those in `keep`. Returns whom it dropped, by id.
+/// neighbours count as well, so that going the same way again does not grow the map. Where the
+/// world looks different each time none is redundant: then of more than `place_keyframes` that look
+/// the same way from the place of `id`, those go whose own landmarks were found most seldom. Keeps
+/// the root, `id` and those in `keep`. Returns whom it dropped, by id.
 std::vector<KeyframeId> cull_keyframes(Map& map,
                                        const ObservationModel& model,
                                        KeyframeId id,

@@ -29,6 +29,7 @@ struct MappingConfig {
   double max_redundancy = 0.9;         ///< Share of its points seen elsewhere, above which a
                                        ///< keyframe is dropped.
   int redundancy_observers = 3;        ///< How many others must see a point.
+  int place_keyframes = 10;            ///< Looking the same way from one place, so many at most.
   double min_parallax_deg = 1.0;       ///< Between the rays of a triangulated landmark.
   int full_bundle_iterations = 10;     ///< Of the bundle adjustment after a loop; 0: none.
   optimization::BundleAdjustmentConfig bundle;
@@ -57,6 +58,7 @@ struct MappingConfig {
     field("min_observations", self.min_observations, config::at_least(1));
     field("max_redundancy", self.max_redundancy, config::at_least(0.5), config::at_most(1.0));
     field("redundancy_observers", self.redundancy_observers, config::at_least(1));
+    field("place_keyframes", self.place_keyframes, config::at_least(2));
     field("min_parallax_deg", self.min_parallax_deg, config::greater_than(0.0));
     field("full_bundle_iterations", self.full_bundle_iterations, config::at_least(0));
     field("bundle", self.bundle);
