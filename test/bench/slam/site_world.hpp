@@ -18,7 +18,8 @@ class SiteWorld {
   static constexpr double kRadius_m = 90.0;
   static constexpr double kLap_m = 2.0 * std::numbers::pi * kRadius_m;
 
-  explicit SiteWorld(unsigned seed) : random_(seed), sectors_(kSectors) {
+  /// `changing`: the share of points that look different in every lap (parked cars, leaves, light).
+  SiteWorld(unsigned seed, double changing) : random_(seed), sectors_(kSectors) {
     camera_.pinhole = {500.0, 500.0, 320.0, 240.0, 0.05};
     camera_.width_px = 640;
     camera_.height_px = 480;
@@ -33,6 +34,7 @@ class SiteWorld {
                        height_m};
       point.max_distance_m = 8.0F + 40.0F * static_cast<float>(std::abs(unit(random_)));
       point.angle_rad = 3.0F + 3.0F * static_cast<float>(unit(random_));
+      point.changes = std::abs(unit(random_)) < changing;
       for (auto& byte : point.descriptor.bytes) byte = static_cast<std::uint8_t>(random_());
       sectors_[sector_of(angle_rad)].push_back(point);
     }
@@ -50,6 +52,7 @@ class SiteWorld {
             {radius_m * std::cos(angle_rad), radius_m * std::sin(angle_rad), 0.0}};
   }
 
+  void set_lap(std::uint64_t lap) { lap_ = lap; }
   [[nodiscard]] tracking::Frame see(const geometry::SE3& T_world_camera, std::uint64_t frame_id) {
     tracking::Frame frame;
     frame.frame_id = frame_id;
@@ -70,6 +73,7 @@ class SiteWorld {
     Eigen::Vector3d p_world;
     float max_distance_m = 0.0F;
     float angle_rad = 0.0F;
+    bool changes = false;
     features::Descriptor descriptor;
   };
   static constexpr int kPoints = 42000;
@@ -80,6 +84,15 @@ class SiteWorld {
   static std::size_t sector_of(double angle_rad) {
     const double turns = angle_rad / (2.0 * std::numbers::pi);
     return static_cast<std::size_t>((turns - std::floor(turns)) * kSectors) % kSectors;
+  }
+
+  /// The same all through a lap.
+  void disguise(features::Descriptor& descriptor) const {
+    std::uint64_t noise = lap_ * 0x9E3779B97F4A7C15ULL;
+    for (auto& byte : descriptor.bytes) {
+      noise = noise * 6364136223846793005ULL + 1442695040888963407ULL;
+      byte = static_cast<std::uint8_t>(byte ^ (noise >> 56U));
+    }
   }
 
   void add(const Point& point, const Eigen::Vector3d& p_camera, features::FrameFeatures& features) {
@@ -101,6 +114,7 @@ class SiteWorld {
         {seen_px.x(), seen_px.y(), point.angle_rad, 0.0F, static_cast<std::uint8_t>(octave)});
     features.undistorted_px.push_back(seen_px);
     auto descriptor = point.descriptor;
+    if (point.changes) disguise(descriptor);
     for (int flip = 0; flip < 12; ++flip) {
       const auto bit = random_() % 256;
       descriptor.bytes[bit / 8] ^= static_cast<std::uint8_t>(1U << (bit % 8));
@@ -111,6 +125,7 @@ class SiteWorld {
     features.depth_sigma_m.push_back(static_cast<float>(kDepthSigma_m));
   }
 
+  std::uint64_t lap_ = 0;
   std::mt19937 random_;
   std::normal_distribution<double> normal_;
   tracking::TrackingCamera camera_;
