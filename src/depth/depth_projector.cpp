@@ -87,6 +87,14 @@ std::size_t write_pixels(const CellPixels& pixels, const Block& block) {
   return filled;
 }
 
+void clear(const Block& block) {
+  for (int v = 0; v < block.height && block.width > 0; ++v) {
+    const auto to = static_cast<std::size_t>(v) * block.stride;
+    std::fill_n(block.depth_m + to, block.width, 0.0F);
+    std::fill_n(block.sigma_m + to, block.width, 0.0F);
+  }
+}
+
 /// The plane stays well in front of the camera over the whole cell.
 bool is_usable(const CellPlane& plane) {
   const float change = 0.5F * kCell * (std::abs(plane.slope_u) + std::abs(plane.slope_v));
@@ -109,31 +117,48 @@ struct DepthProjector::Implementation {
     MixedCellFiller filler(make_rule(config), noise);
     CellPixels pixels;
     std::size_t filled = 0;
-    const auto stride = static_cast<std::size_t>(width_px);
     for (int row = kMargin; row < grid.rows() - kMargin; ++row) {
-      const auto first = static_cast<std::size_t>((row - kMargin) * kCell) * stride;
-      const std::size_t length = std::min(kCell * stride, depth_m.size() - first);
-      std::fill_n(&depth_m[first], length, 0.0F);
-      std::fill_n(&sigma_m[first], length, 0.0F);
+      Block empty = block_at(0, row, depth_m, sigma_m);  // Grows until a cell with depth follows.
+      empty.width = 0;
       for (int column = kMargin; column < grid.columns() - kMargin; ++column) {
-        const int u = (column - kMargin) * kCell;
-        const int v = (row - kMargin) * kCell;
-        const auto offset = static_cast<std::size_t>(v) * stride + static_cast<std::size_t>(u);
-        const Block block{&depth_m[offset],
-                          &sigma_m[offset],
-                          stride,
-                          std::min(kCell, width_px - u),
-                          std::min(kCell, height_px - v)};
+        const Block block = block_at(column - kMargin, row, depth_m, sigma_m);
         const std::size_t cell = grid.cell(column, row);
-        if (planes.kind(cell) == CellKind::kPlane && is_usable(planes.plane(cell))) {
+        const bool plane = planes.kind(cell) == CellKind::kPlane && is_usable(planes.plane(cell));
+        if (!plane && !filler.fill(grid, planes, column, row, pixels)) {
+          if (empty.width == 0)
+            empty = block;
+          else
+            empty.width += block.width;
+          continue;
+        }
+        clear(empty);
+        empty.width = 0;
+        if (plane) {
           write_plane(planes.plane(cell), block);
           filled += static_cast<std::size_t>(block.width * block.height);
-        } else if (filler.fill(grid, planes, column, row, pixels)) {
+        } else {
           filled += write_pixels(pixels, block);
         }
       }
+      clear(empty);
     }
     return filled;
+  }
+
+  /// The pixels of a cell, counted from the image's left border.
+  [[nodiscard]] Block block_at(int column,
+                               int row,
+                               std::span<float> depth_m,
+                               std::span<float> sigma_m) const {
+    const auto stride = static_cast<std::size_t>(width_px);
+    const int u = column * kCell;
+    const int v = (row - kMargin) * kCell;
+    const auto offset = static_cast<std::size_t>(v) * stride + static_cast<std::size_t>(u);
+    return {&depth_m[offset],
+            &sigma_m[offset],
+            stride,
+            std::min(kCell, width_px - u),
+            std::min(kCell, height_px - v)};
   }
 
   DepthProjectorConfig config;

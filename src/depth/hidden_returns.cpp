@@ -33,14 +33,24 @@ bool hides(const ProjectedPoints& points,
          across_times_shift * across_times_shift <= limit2;
 }
 
-/// Inverse depth of the nearest return in the cells around.
-float nearest_around(const CellGrid& grid, std::size_t cell) {
+/// Returns in the cells around that are nearer than the farthest of the cell's own, by the gap.
+void find_nearer(const CellGrid& grid,
+                 std::size_t cell,
+                 float ratio,
+                 std::vector<std::size_t>& near) {
+  const std::vector<float>& rho = grid.points().rho;
+  near.clear();
+  float least = rho[grid.begin(cell)];
+  for (std::size_t i = grid.begin(cell); i < grid.end(cell); ++i) least = std::min(least, rho[i]);
   const auto stride = static_cast<std::size_t>(grid.columns());
-  float nearest = 0.0F;
-  for (std::size_t c = cell - stride; c <= cell + stride; c += stride) {
-    nearest = std::max({nearest, grid.nearest(c - 1), grid.nearest(c), grid.nearest(c + 1)});
+  for (std::size_t row = cell - stride; row <= cell + stride; row += stride) {
+    for (std::size_t c = row - 1; c <= row + 1; ++c) {
+      if (grid.nearest(c) * ratio <= least) continue;
+      for (std::size_t i = grid.begin(c); i < grid.end(c); ++i) {
+        if (rho[i] * ratio > least) near.push_back(i);
+      }
+    }
   }
-  return nearest;
 }
 
 }  // namespace
@@ -50,32 +60,24 @@ std::size_t find_hidden(const PlaneMap& planes,
                         const CellGrid& grid,
                         std::vector<std::uint8_t>& hidden) {
   const ProjectedPoints& points = grid.points();
-  const auto stride = static_cast<std::size_t>(grid.columns());
   hidden.assign(points.size(), 0);
+  std::vector<std::size_t> near;
   std::size_t count = 0;
-  const auto is_hidden = [&](std::size_t far, std::size_t cell, float footprint_px) {
-    for (std::size_t row = cell - stride; row <= cell + stride; row += stride) {
-      for (std::size_t c = row - 1; c <= row + 1; ++c) {
-        if (grid.nearest(c) * (1.0F - rule.surface_gap) <= points.rho[far]) continue;
-        for (std::size_t near = grid.begin(c); near < grid.end(c); ++near) {
-          if (hides(points, near, far, footprint_px, rule.surface_gap)) return true;
-        }
-      }
-    }
-    return false;
-  };
   for (int row = kMargin; row < grid.rows() - kMargin; ++row) {
     for (int column = kMargin; column < grid.columns() - kMargin; ++column) {
       const std::size_t cell = grid.cell(column, row);
       if (planes.kind(cell) == CellKind::kPlane || grid.begin(cell) == grid.end(cell)) continue;
-      const float bound = nearest_around(grid, cell) * (1.0F - rule.surface_gap);
+      find_nearer(grid, cell, 1.0F - rule.surface_gap, near);
+      if (near.empty()) continue;
       const auto window = static_cast<float>(grid.count(cell, 1));
       const float footprint = std::clamp(
           3.0F * kCell / std::sqrt(window), rule.least_footprint_px, rule.most_footprint_px);
       for (std::size_t far = grid.begin(cell); far < grid.end(cell); ++far) {
-        if (points.rho[far] >= bound || !is_hidden(far, cell, footprint)) continue;
-        hidden[far] = 1;
-        ++count;
+        const bool found = std::any_of(near.begin(), near.end(), [&](std::size_t i) {
+          return hides(points, i, far, footprint, rule.surface_gap);
+        });
+        hidden[far] = static_cast<std::uint8_t>(found);
+        count += static_cast<std::size_t>(found);
       }
     }
   }

@@ -313,15 +313,17 @@ void MixedCellFiller::measure(const Returns& returns,
     const float u_px = returns.u_px[i];
     const float v_px = returns.v_px[i];
     float du2[kCell];
-    for (int u = 0; u < kCell; ++u) {
-      const float du = static_cast<float>(u) - kMiddle - u_px;
-      du2[u] = du * du;
+    float dv2[kCell];
+    for (int k = 0; k < kCell; ++k) {
+      const float du = static_cast<float>(k) - kMiddle - u_px;
+      const float dv = static_cast<float>(k) - kMiddle - v_px;
+      du2[k] = du * du;
+      dv2[k] = dv * dv;
     }
+#pragma GCC unroll 8  // A row is one instruction or two: a loop would double them.
     for (int v = 0; v < kCell; ++v) {
-      const float dv = static_cast<float>(v) - kMiddle - v_px;
-      const float dv2 = dv * dv;
       for (int u = 0; u < kCell; ++u) {
-        const float d2 = du2[u] + dv2;
+        const float d2 = du2[u] + dv2[v];
         float& least = d[v * kCell + u];
         least = d2 < least ? d2 : least;
       }
