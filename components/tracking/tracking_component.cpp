@@ -118,9 +118,12 @@ bool TrackingComponent::may_process() const {
 void TrackingComponent::process(const FrameInputs& inputs) {
   const double started_s = thread_processor_time_s();
   const auto header = (*inputs.image)->header();
-  auto result = tracker_.track(make_frame(inputs));
+  auto frame = make_frame(inputs);
+  const auto R_previous_camera = frame.R_previous_camera;
+  auto result = tracker_.track(std::move(frame));
   last_frame_id_ = header.frame_id();
   publish(result, thread_processor_time_s() - started_s);
+  health_.add(result, R_previous_camera);
   report(result);
   progress_.done(header);
 }
@@ -196,7 +199,6 @@ void TrackingComponent::report(const tracking::FrameResult& result) {
   diagnostics.set("dropped frames", queue_.dropped());
   diagnostics.set("landmarks", static_cast<std::uint64_t>(tracker_.map().landmarks().size()));
   count("banned landmarks", statistics.banned_landmarks);
-  health_.add(result);
   const auto& health = health_.status();
   diagnostics.report(kLevels.at(static_cast<std::size_t>(health.level)), health.message);
 }

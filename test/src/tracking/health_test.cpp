@@ -53,5 +53,32 @@ TEST(HealthTest, DepthThatDisagreesPointsAtTheExtrinsics) {
   EXPECT_EQ(after(result, 200).status().level, Health::kOk);
 }
 
+/// A camera that is turned by 1 degree a frame, to and fro, and sees `scale` times that.
+Health turning(double scale, double turn_deg, HealthMonitor* keep = nullptr) {
+  HealthMonitor monitor;
+  FrameResult result = good();
+  for (int i = 0; i < 100; ++i) {
+    const double turn_rad = (i / 20 % 2 == 0 ? 1.0 : -1.0) * turn_deg * 0.01745;
+    const double noise_rad = (i % 2 == 0 ? 1.0 : -1.0) * 1e-3;
+    const geometry::SO3 by_camera = geometry::SO3::exp({noise_rad, scale * turn_rad, 0.0});
+    result.T_odom_camera =
+        geometry::SE3(result.T_odom_camera.rotation() * by_camera, Eigen::Vector3d::Zero());
+    monitor.add(result, geometry::SO3::exp({0.0, turn_rad, 0.0}));
+  }
+  if (keep != nullptr) *keep = monitor;
+  return monitor.status().level;
+}
+
+TEST(HealthTest, TurnsThatTheGyroSeesOtherwisePointAtTheFocalLength) {
+  EXPECT_EQ(turning(1.0, 1.0), Health::kOk);
+  EXPECT_EQ(turning(1.02, 1.0), Health::kOk);
+  HealthMonitor monitor;
+  EXPECT_EQ(turning(1.25, 1.0, &monitor), Health::kWarn) << "configured 20 % too short";
+  EXPECT_THAT(monitor.status().message, HasSubstr("25 % more than the gyro: focal length"));
+  EXPECT_EQ(turning(0.9, 1.0, &monitor), Health::kWarn);
+  EXPECT_THAT(monitor.status().message, HasSubstr("10 % less"));
+  EXPECT_EQ(turning(1.25, 0.01), Health::kOk) << "next to no turn says nothing";
+}
+
 }  // namespace
 }  // namespace camvox::tracking
