@@ -106,10 +106,15 @@ FakeSubscription& FakeContext::input(std::string_view port) const {
 }
 
 std::shared_ptr<void> FakeContext::new_input(std::string_view port, const MessageType* type) {
-  const auto& subscription = input(port);
-  require_type(subscription, "input", port, type);
-  return make_unclean_message(subscription.type());
+  require_input(port, type);
+  return make_unclean_message(input(port).type());
 }
+
+void FakeContext::require_input(std::string_view port, const MessageType* type) const {
+  require_type(input(port), "input", port, type);
+}
+
+void FakeContext::forget_published(std::string_view port) { output(port).forget(); }
 
 void FakeContext::send_copy(std::string_view port, const MessageType* type, const void* message) {
   auto copy = new_input(port, type);

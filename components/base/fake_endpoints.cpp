@@ -70,6 +70,11 @@ std::vector<std::shared_ptr<const void>> FakePublisher::published() const {
   return published_;
 }
 
+void FakePublisher::forget() {
+  const std::lock_guard lock(mutex_);
+  published_.clear();
+}
+
 std::size_t FakePublisher::outstanding() const {
   const std::lock_guard lock(mutex_);
   return lent_.size();

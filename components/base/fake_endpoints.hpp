@@ -27,6 +27,7 @@ class FakePublisher final : public PublisherBackend {
   [[nodiscard]] bool raw() const { return raw_; }
   void set_subscriber_count(std::size_t count) { subscribers_ = count; }
   [[nodiscard]] std::vector<std::shared_ptr<const void>> published() const;
+  void forget();
   [[nodiscard]] std::size_t outstanding() const;
   [[nodiscard]] std::size_t discarded() const;
 

@@ -97,6 +97,19 @@ TEST(FakeContext, TakesMessagesInAndOut) {
   EXPECT_NO_THROW(fake.verify_nothing_left());
 }
 
+TEST(FakeContext, PassesOnWhatAnotherComponentPublished) {
+  FakeContext first, second;
+  CropComponent cropping(first), again(second);
+  first.send<Cloud>("cloud", at({1, 20, 3}));
+  const auto taken = first.take_published<Cloud>("near");
+  ASSERT_THAT(taken, SizeIs(1));
+  EXPECT_THAT(first.published<Cloud>("near"), SizeIs(0)) << "taken is gone";
+  second.pass_on("cloud", taken[0]);
+  ASSERT_THAT(second.published<Cloud>("near"), SizeIs(1));
+  EXPECT_EQ(second.published<Cloud>("near")[0]->points_count(), 2U);
+  EXPECT_THROW(second.pass_on("cloud", std::shared_ptr<const Imu>()), std::logic_error);
+}
+
 TEST(FakeContext, CopiesRosAndRawMessages) {
   FakeContext fake;
   CropComponent component(fake);

@@ -7,6 +7,7 @@
 #include "camvox/deskew_component/deskew_component.hpp"
 #include "camvox/simulation/simulator.hpp"
 #include "camvox/sync_component/sync_component.hpp"
+#include "camvox/test/simulated_messages.hpp"
 
 // A simulated robot's messages through sync and deskew, against the simulation's truth.
 namespace camvox {
@@ -16,44 +17,11 @@ namespace msg = camvox_interfaces::msg;
 using geometry::SE3;
 using simulation::ImuSample;
 using simulation::LidarScan;
+using test::set_stamp;
+using test::to_message;
 
 constexpr std::uint32_t kWidth = 64, kHeight = 48;
 constexpr std::int64_t kFrame_ns = 100'000'000;
-
-template <typename Message>
-void set_stamp(Message& message, std::int64_t stamp_ns) {
-  message.header().stamp().sec(static_cast<std::int32_t>(stamp_ns / 1'000'000'000));
-  message.header().stamp().nanosec(static_cast<std::uint32_t>(stamp_ns % 1'000'000'000));
-}
-
-livox_ros_driver2::msg::CustomMsg to_message(const LidarScan& scan) {
-  livox_ros_driver2::msg::CustomMsg message;
-  set_stamp(message, scan.stamp_ns);
-  message.timebase(static_cast<std::uint64_t>(scan.stamp_ns));
-  for (const auto& simulated : scan.points) {
-    auto& point = message.points().emplace_back();
-    point.offset_time(simulated.offset_ns);
-    point.x(simulated.p_lidar.x());
-    point.y(simulated.p_lidar.y());
-    point.z(simulated.p_lidar.z());
-    point.reflectivity(simulated.reflectivity);
-    point.tag(simulated.tag);
-    point.line(simulated.line);
-  }
-  return message;
-}
-
-sensor_msgs::msg::Imu to_message(const ImuSample& sample) {
-  sensor_msgs::msg::Imu message;
-  set_stamp(message, sample.stamp_ns);
-  message.angular_velocity().x(sample.omega_rad_s.x());
-  message.angular_velocity().y(sample.omega_rad_s.y());
-  message.angular_velocity().z(sample.omega_rad_s.z());
-  message.linear_acceleration().x(sample.force_m_s2.x());
-  message.linear_acceleration().y(sample.force_m_s2.y());
-  message.linear_acceleration().z(sample.force_m_s2.z());
-  return message;
-}
 
 simulation::SimulationOptions noiseless(const std::string& preset) {
   auto options = simulation::preset(preset);

@@ -49,6 +49,12 @@ class FakeContext final : public Context {
   void send(std::string_view port, const T& message) {
     send_copy(port, type_of<T>(), &message);
   }
+  /// Delivers what another component published, the message itself.
+  template <typename T>
+  void pass_on(std::string_view port, const std::shared_ptr<const T>& message) {
+    require_input(port, type_of<T>());
+    deliver(port, std::const_pointer_cast<T>(message));
+  }
   /// Delivers a message that `fill` writes in place; for large ones.
   template <typename T, std::invocable<T&> Fill>
   void send(std::string_view port, Fill&& fill) {
@@ -64,6 +70,14 @@ class FakeContext final : public Context {
     for (auto& message : published_on(port, type_of<T>())) {
       messages.push_back(std::static_pointer_cast<const T>(std::move(message)));
     }
+    return messages;
+  }
+
+  /// The same, and forgets them: for chains of components that run for long.
+  template <typename T>
+  [[nodiscard]] std::vector<std::shared_ptr<const T>> take_published(std::string_view port) {
+    auto messages = published<T>(port);
+    forget_published(port);
     return messages;
   }
 
@@ -139,6 +153,8 @@ class FakeContext final : public Context {
 
   [[nodiscard]] std::shared_ptr<void> new_input(std::string_view port, const MessageType* type);
   void send_copy(std::string_view port, const MessageType* type, const void* message);
+  void require_input(std::string_view port, const MessageType* type) const;
+  void forget_published(std::string_view port);
   void deliver(std::string_view port, std::shared_ptr<void> message);
   void deliver_waiting();
   [[nodiscard]] std::vector<std::shared_ptr<const void>> published_on(
