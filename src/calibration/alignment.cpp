@@ -78,6 +78,42 @@ Match match_contrast(const ImageEdges& image, const ProjectedEdge& edge, double 
   return {moment / sum, mean / (mean + 0.05)};
 }
 
+/// A weighted mean, and its standard error from the spread over tiles.
+class TileMean {
+ public:
+  void start_scene(std::size_t tiles) {
+    first_ = tiles_.size();
+    tiles_.resize(first_ + tiles);
+  }
+  void add(std::size_t tile, double weight, double value) {
+    tiles_[first_ + tile].weight += weight;
+    tiles_[first_ + tile].sum += weight * value;
+  }
+  [[nodiscard]] Gain result() const {
+    double weight = 0.0;
+    double sum = 0.0;
+    double used = 0.0;
+    for (const Tile& tile : tiles_) {
+      weight += tile.weight;
+      sum += tile.sum;
+      used += tile.weight > 0.0 ? 1.0 : 0.0;
+    }
+    if (!(used > 1.0)) return {};
+    const double mean = sum / weight;
+    double squares = 0.0;
+    for (const Tile& tile : tiles_) squares += std::pow(tile.sum - mean * tile.weight, 2);
+    return {mean, std::sqrt(squares * used / (used - 1.0)) / weight};
+  }
+
+ private:
+  struct Tile {
+    double weight = 0.0;
+    double sum = 0.0;
+  };
+  std::vector<Tile> tiles_;
+  std::size_t first_ = 0;
+};
+
 }  // namespace
 
 double Alignment::score(const SE3& T_camera_lidar, std::size_t level, Part part) const {
@@ -200,26 +236,113 @@ SE3 Alignment::climb(const SE3& T_camera_lidar,
   return T;
 }
 
-NormalEquations Alignment::linearise(const SE3& T_camera_lidar, double reach_px, Part part) const {
+template <typename Visit>
+void Alignment::for_each_match(const PreparedScene& scene,
+                               const SE3& T_camera_lidar,
+                               double reach_px,
+                               Part part,
+                               Visit&& visit) const {
   const Eigen::Matrix3d R = T_camera_lidar.rotation().matrix();
+  for (std::size_t i = 0; i < scene.lidar.edges.size(); ++i) {
+    if (!selected(scene, i, part)) continue;
+    const auto edge = project(camera_, T_camera_lidar, R, scene.lidar.edges[i]);
+    if (edge) visit(i, *edge, match_contrast(scene.image, *edge, reach_px));
+  }
+}
+
+NormalEquations Alignment::linearise(const SE3& T_camera_lidar, double reach_px, Part part) const {
   NormalEquations equations;
   for (const PreparedScene& scene : scenes_) {
-    for (std::size_t i = 0; i < scene.lidar.edges.size(); ++i) {
-      if (!selected(scene, i, part)) continue;
-      const LidarEdge& lidar_edge = scene.lidar.edges[i];
-      const auto edge = project(camera_, T_camera_lidar, R, lidar_edge);
-      if (!edge) continue;
-      const auto weight = static_cast<double>(lidar_edge.strength);
-      const Match match = match_contrast(scene.image, *edge, reach_px);
+    const auto add = [&](std::size_t i, const ProjectedEdge& edge, const Match& match) {
+      const auto weight = static_cast<double>(scene.lidar.edges[i].strength);
       const double w = weight * match.quality;
       equations.weight += weight;
-      equations.H += w * edge->J.transpose() * edge->J;
-      equations.b += w * match.offset_px * edge->J.transpose();
+      equations.H += w * edge.J.transpose() * edge.J;
+      equations.b += w * match.offset_px * edge.J.transpose();
       equations.inlier_weight += w;
       equations.squared_error_px2 += w * match.offset_px * match.offset_px;
-    }
+    };
+    for_each_match(scene, T_camera_lidar, reach_px, part, add);
   }
   return equations;
+}
+
+std::vector<geometry::Vector6d> Alignment::tile_gradients(const SE3& T_camera_lidar,
+                                                          double reach_px) const {
+  std::vector<geometry::Vector6d> gradients;
+  for (const PreparedScene& scene : scenes_) {
+    const std::size_t first = gradients.size();
+    gradients.resize(first + scene.tile_count, geometry::Vector6d::Zero());
+    const auto add = [&](std::size_t i, const ProjectedEdge& edge, const Match& match) {
+      const double w = static_cast<double>(scene.lidar.edges[i].strength) * match.quality;
+      gradients[first + scene.tiles[i]] += w * match.offset_px * edge.J.transpose();
+    };
+    for_each_match(scene, T_camera_lidar, reach_px, Part::kAll, add);
+  }
+  return gradients;
+}
+
+std::vector<float> Alignment::densities(const PreparedScene& scene,
+                                        const SE3& T_camera_lidar,
+                                        std::size_t level) const {
+  const Eigen::Matrix3d R = T_camera_lidar.rotation().matrix();
+  std::vector<float> densities(scene.lidar.edges.size(), 0.0F);
+  for (std::size_t i = 0; i < densities.size(); ++i) {
+    const auto edge = project(camera_, T_camera_lidar, R, scene.lidar.edges[i]);
+    if (edge) densities[i] = scene.fields[level].sample(edge->u_px, edge->normal).density;
+  }
+  return densities;
+}
+
+Gain Alignment::gain(const SE3& T_new, const SE3& T_old, std::size_t level, Part part) const {
+  TileMean mean;
+  for (const PreparedScene& scene : scenes_) {
+    mean.start_scene(scene.tile_count);
+    const auto of_new = densities(scene, T_new, level);
+    const auto of_old = densities(scene, T_old, level);
+    for (std::size_t i = 0; i < scene.lidar.edges.size(); ++i) {
+      if (!selected(scene, i, part)) continue;
+      mean.add(scene.tiles[i],
+               static_cast<double>(scene.lidar.edges[i].strength),
+               static_cast<double>(gain_over_chance(of_new[i]) - gain_over_chance(of_old[i])));
+    }
+  }
+  return mean.result();
+}
+
+Gain Alignment::gain_over_nothing(const SE3& T_camera_lidar, std::size_t level) const {
+  std::vector<std::vector<float>> densities_of;
+  for (const PreparedScene& scene : scenes_) {
+    densities_of.push_back(densities(scene, T_camera_lidar, level));
+  }
+  Gain best;
+  for (double share = 0.3; share < 1.0; share += 0.05) {
+    TileMean mean;
+    for (std::size_t s = 0; s < scenes_.size(); ++s) {
+      mean.start_scene(scenes_[s].tile_count);
+      for (std::size_t i = 0; i < densities_of[s].size(); ++i) {
+        mean.add(scenes_[s].tiles[i],
+                 static_cast<double>(scenes_[s].lidar.edges[i].strength),
+                 std::log(share + (1.0 - share) * static_cast<double>(densities_of[s][i])));
+      }
+    }
+    const Gain gain = mean.result();
+    if (gain.mean > best.mean) best = gain;
+  }
+  return best;
+}
+
+double Alignment::best_gain(std::size_t level) const {
+  double sum = 0.0;
+  double count = 0.0;
+  for (const PreparedScene& scene : scenes_) {
+    for (const Ridge& ridge : scene.image.ridges()) {
+      const auto sample = scene.fields[level].sample({ridge.u, ridge.v}, ridge.normal);
+      sum += static_cast<double>(gain_over_chance(sample.density));
+      count += 1.0;
+    }
+  }
+  return count > 0.0 ? sum / count : 0.0;
 }
 
 SE3 Alignment::refine(const SE3& T_camera_lidar,

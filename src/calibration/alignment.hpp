@@ -21,6 +21,10 @@ struct PreparedScene {
   ImageEdges image;
   std::vector<EdgeField> fields;  ///< From coarse to fine.
   std::vector<Part> parts;        ///< Of every lidar edge.
+  /// Of every lidar edge the tile of the view, from 0. Within a tile errors depend on each other:
+  /// many edges follow one border; from tile to tile they hardly do.
+  std::vector<std::size_t> tiles;
+  std::size_t tile_count = 0;
 };
 
 /// One step's normal equations, for a right perturbation: [rotation; translation] of the lidar.
@@ -31,6 +35,13 @@ struct NormalEquations {
   double inlier_weight = 0.0;      ///< The part of it that found its image edge.
   double squared_error_px2 = 0.0;  ///< Weighted, of those.
   double score = 0.0;              ///< Mean gain over chance; see Alignment::score.
+};
+
+/// By how much one pose fits better than another, nats per edge, and the standard error of that:
+/// from the spread over the tiles.
+struct Gain {
+  double mean = 0.0;
+  double standard_error = 0.0;
 };
 
 /// What holds the translation where the scenes do not.
@@ -79,6 +90,29 @@ class Alignment {
                                           double reach_px,
                                           Part part = Part::kAll) const;
 
+  /// The right side of `linearise`, for each tile of each scene.
+  [[nodiscard]] std::vector<geometry::Vector6d> tile_gradients(const geometry::SE3& T_camera_lidar,
+                                                               double reach_px) const;
+
+  /// Of `T_new` over `T_old`, in the score of one level.
+  [[nodiscard]] Gain gain(const geometry::SE3& T_new,
+                          const geometry::SE3& T_old,
+                          std::size_t level,
+                          Part part = Part::kAll) const;
+
+  /// Of the pose over chance, if the share of edges without a counterpart is what fits best: near
+  /// 0 for any wrong pose.
+  [[nodiscard]] Gain gain_over_nothing(const geometry::SE3& T_camera_lidar,
+                                       std::size_t level) const;
+
+  /// What gain_over_nothing would be if the lidar had seen the edges of the images themselves.
+  [[nodiscard]] double best_gain(std::size_t level) const;
+
+  /// The sigma of a level's fields, as an angle.
+  [[nodiscard]] double width_rad(std::size_t level) const {
+    return scenes_.front().fields[level].sigma_px() / focal_px();
+  }
+  [[nodiscard]] double focal_px() const { return camera_.intrinsics().fx_px; }
   [[nodiscard]] std::size_t levels() const { return scenes_.front().fields.size(); }
   [[nodiscard]] const std::vector<PreparedScene>& scenes() const { return scenes_; }
 
@@ -86,6 +120,18 @@ class Alignment {
   [[nodiscard]] NormalEquations climb_equations(const geometry::SE3& T_camera_lidar,
                                                 std::size_t level,
                                                 Part part) const;
+
+  /// Around each edge of a scene, under the field of one level.
+  [[nodiscard]] std::vector<float> densities(const PreparedScene& scene,
+                                             const geometry::SE3& T_camera_lidar,
+                                             std::size_t level) const;
+  /// Calls visit(index of the edge, projected edge, match) for the edges of a scene in the image.
+  template <typename Visit>
+  void for_each_match(const PreparedScene& scene,
+                      const geometry::SE3& T_camera_lidar,
+                      double reach_px,
+                      Part part,
+                      Visit&& visit) const;
 
   sensors::CameraModel camera_;
   std::vector<PreparedScene> scenes_;

@@ -1,149 +1,109 @@
 #include "camvox/calibration/calibrator.hpp"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <numbers>
+#include <optional>
 
 #include "alignment.hpp"
 #include "camvox/calibration/nid.hpp"
 #include "prepare.hpp"
+#include "verdict.hpp"
 
 namespace camvox::calibration {
 namespace {
 
-using geometry::Matrix6d;
 using geometry::SE3;
 
 constexpr double kDegree = std::numbers::pi / 180.0;
-constexpr std::size_t kStarts = 24;     ///< Places of the grid that are climbed from.
-constexpr double kObservable_m = 0.02;  ///< A translation known this well is observed.
-constexpr double kMinGain = 0.02;       ///< On held-back edges, to be better at all.
+constexpr double kSamePlace =
+    4.0;  ///< Two are one place within so many sigmas of the finest level.
+constexpr std::size_t kStarts = 24;  ///< Places of the grid that are climbed from.
 
 /// Reach of the last stages, in px, or in sigmas of a coarser lidar.
-double final_reach_px(const Alignment& alignment, double focal_px, double scale) {
-  const double lidar_px = alignment.scenes().front().lidar.sigma_rad * focal_px;
-  return std::max(scale, 0.6 * lidar_px * scale / 1.5);
+double final_reach_px(const Alignment& alignment, double scale_px) {
+  const double lidar_px = alignment.scenes().front().lidar.sigma_rad * alignment.focal_px();
+  return std::max(scale_px, 0.4 * lidar_px * scale_px);
 }
 
-/// From a guess some degrees off to the neighbourhood of the solution.
-SE3 find(const Alignment& alignment,
-         const SE3& guess,
-         const TranslationPrior& prior,
-         double reach_rad,
-         const std::stop_token& stop) {
-  struct Climber {
-    double score;
-    SE3 T_camera_lidar;
-  };
+/// A place that edges fit to.
+struct Climber {
+  double score = 0.0;
+  SE3 T_camera_lidar;
+};
+
+double angle_rad(const SE3& T_a, const SE3& T_b) {
+  return (T_a.rotation().inverse() * T_b.rotation()).angle_rad();
+}
+
+/// Sorts the best to the front, and drops those that ended within `radius_rad` of a better one.
+void keep_different(std::vector<Climber>& climbers, double radius_rad, std::size_t count) {
+  std::stable_sort(climbers.begin(), climbers.end(), [](const auto& a, const auto& b) {
+    return a.score > b.score;
+  });
+  std::vector<Climber> kept;
+  for (const Climber& climber : climbers) {
+    const bool near = std::any_of(kept.begin(), kept.end(), [&](const Climber& other) {
+      return angle_rad(other.T_camera_lidar, climber.T_camera_lidar) < radius_rad;
+    });
+    if (!near && kept.size() < count) kept.push_back(climber);
+  }
+  climbers = std::move(kept);
+}
+
+/// From a guess some degrees off to the neighbourhood of the solution, best first.
+std::vector<Climber> find(const Alignment& alignment,
+                          const SE3& guess,
+                          const TranslationPrior& prior,
+                          double reach_rad,
+                          const std::stop_token& stop) {
   std::vector<Climber> climbers;
   for (const SE3& start : alignment.search(guess, reach_rad, kStarts, stop)) {
-    if (stop.stop_requested()) return guess;
+    if (stop.stop_requested()) return {};
     const SE3 T = alignment.climb(start, 0, prior);
     climbers.push_back({alignment.score(T, 1), T});
   }
   std::size_t keep = kStarts / 2;
-  for (std::size_t level = 1; level < alignment.levels(); ++level, keep /= 2) {
-    std::stable_sort(climbers.begin(), climbers.end(), [](const auto& a, const auto& b) {
-      return a.score > b.score;
-    });
-    climbers.resize(std::min(climbers.size(), keep));
+  for (std::size_t level = 1; level < alignment.levels(); ++level, keep = keep * 2 / 3) {
+    keep_different(climbers, 0.5 * alignment.width_rad(level - 1), keep);
     for (Climber& climber : climbers) {
-      if (stop.stop_requested()) return guess;
+      if (stop.stop_requested()) return {};
       climber.T_camera_lidar = alignment.climb(climber.T_camera_lidar, level, prior);
       climber.score =
           alignment.score(climber.T_camera_lidar, std::min(level + 1, alignment.levels() - 1));
     }
   }
-  const auto best = std::max_element(
-      climbers.begin(), climbers.end(), [](auto& a, auto& b) { return a.score < b.score; });
-  return best == climbers.end() ? guess : best->T_camera_lidar;
+  keep_different(climbers, alignment.width_rad(alignment.levels() - 1), keep);
+  return climbers;
 }
 
-double angle_deg(const SE3& T_a, const SE3& T_b) {
-  return (T_a.rotation().inverse() * T_b.rotation()).angle_rad() / kDegree;
+/// From a place to a fraction of a pixel.
+SE3 refine(const Alignment& alignment,
+           const Climber& place,
+           const TranslationPrior& prior,
+           const std::stop_token& stop) {
+  SE3 T = place.T_camera_lidar;
+  for (const double scale_px : {4.0, 2.5, 1.5}) {
+    if (stop.stop_requested()) break;
+    T = alignment.refine(T, final_reach_px(alignment, scale_px), prior);
+  }
+  return T;
 }
 
-/// Covariance, inflated to what the halves show: they are half of the data each.
-void judge_precision(const Alignment& alignment,
-                     const TranslationPrior& prior,
-                     double reach_px,
-                     const geometry::Vector6d& between_halves,
-                     CalibrationResult& result) {
-  const NormalEquations equations = alignment.linearise(result.T_camera_lidar, reach_px);
-  result.inlier_share = equations.weight > 0.0 ? equations.inlier_weight / equations.weight : 0.0;
-  if (!(equations.inlier_weight > 0.0)) return;
-  const double sigma_px =
-      std::sqrt(std::max(0.01, equations.squared_error_px2 / equations.inlier_weight));
-  const Matrix6d data = information(equations, sigma_px);
-  const Matrix6d total = data + prior_information(prior);
-  const double surprise = between_halves.dot(total * between_halves) / (4.0 * 6.0);
-  result.covariance_lidar = total.inverse() * std::max(1.0, surprise);
-  using Solver = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>;
-  const Solver rotation(result.covariance_lidar.topLeftCorner<3, 3>());
-  const Solver translation(result.covariance_lidar.bottomRightCorner<3, 3>());
-  result.sigma_rotation_deg = std::sqrt(rotation.eigenvalues().maxCoeff()) / kDegree;
-  result.sigma_translation_m = std::sqrt(translation.eigenvalues().maxCoeff());
-  for (int i = 0; i < 3; ++i) {
-    if (std::sqrt(translation.eigenvalues()[i]) < kObservable_m) ++result.observable_translations;
+/// The best of the other places. One that fits well may only have been slow: where rotation and
+/// translation can stand in for each other, it ends at the result when it is refined.
+std::optional<SE3> rival_of(const Alignment& alignment,
+                            const SE3& T_camera_lidar,
+                            const std::vector<Climber>& places,
+                            const TranslationPrior& prior,
+                            const std::stop_token& stop) {
+  const double radius_rad = kSamePlace * alignment.width_rad(alignment.levels() - 1);
+  for (std::size_t i = 1; i < places.size() && !stop.stop_requested(); ++i) {
+    const SE3 T = refine(alignment, places[i], prior, stop);
+    if (angle_rad(T, T_camera_lidar) > radius_rad) return T;
   }
-}
-
-/// Fits both halves and judges each fit on the other half.
-void cross_validate(const Alignment& alignment,
-                    const SE3& guess,
-                    const TranslationPrior& prior,
-                    double reach_px,
-                    CalibrationResult& result) {
-  const std::size_t level = alignment.levels() - 1;
-  const auto fit = [&](Part part) {
-    return alignment.refine(
-        alignment.climb(result.T_camera_lidar, level, prior, part), reach_px, prior, part);
-  };
-  const SE3 even = fit(Part::kEven);
-  const SE3 odd = fit(Part::kOdd);
-  result.disagreement_deg =
-      std::max(angle_deg(even, result.T_camera_lidar), angle_deg(odd, result.T_camera_lidar));
-  result.held_back_before = 0.5 * (alignment.score(guess, level, Part::kOdd) +
-                                   alignment.score(guess, level, Part::kEven));
-  result.held_back_after =
-      0.5 * (alignment.score(even, level, Part::kOdd) + alignment.score(odd, level, Part::kEven));
-  result.score_before = alignment.score(guess, level);
-  result.score_after = alignment.score(result.T_camera_lidar, level);
-  judge_precision(alignment, prior, reach_px, geometry::local(even, odd), result);
-}
-
-std::string number(const char* format, double a, double b) {
-  char text[160];
-  std::snprintf(text, sizeof(text), format, a, b);
-  return text;
-}
-
-/// Why a result must not be used, or "".
-std::string objection(const CalibrationResult& r, const GateConfig& gate) {
-  if (r.score_after < gate.min_score) {
-    return number("score %.2f below %.2f: the edges hardly fit", r.score_after, gate.min_score);
-  }
-  if (r.disagreement_deg > gate.max_disagreement_deg) {
-    return number("halves of the data disagree by %.3f deg, more than %.3f",
-                  r.disagreement_deg,
-                  gate.max_disagreement_deg);
-  }
-  if (r.inlier_share < gate.min_inlier_share) {
-    return number("inlier share %.2f below %.2f", r.inlier_share, gate.min_inlier_share);
-  }
-  if (r.sigma_rotation_deg > gate.max_sigma_deg) {
-    return number(
-        "rotation known to %.3f deg only, not %.3f", r.sigma_rotation_deg, gate.max_sigma_deg);
-  }
-  if (r.held_back_after < r.held_back_before + kMinGain) {
-    return number("not better than before on held-back data: score %.3f, before %.3f",
-                  r.held_back_after,
-                  r.held_back_before);
-  }
-  return {};
+  return std::nullopt;
 }
 
 void add_other_costs(const std::vector<Scene>& scenes,
@@ -162,6 +122,12 @@ void add_other_costs(const std::vector<Scene>& scenes,
   const CamvoxCost cost(scenes.front(), camera, config);
   result.camvox_cost_before = cost(guess);
   result.camvox_cost_after = cost(result.T_camera_lidar);
+}
+
+std::string line(const char* format, double a, double b) {
+  char text[160];
+  std::snprintf(text, sizeof(text), format, a, b);
+  return text;
 }
 
 }  // namespace
@@ -209,21 +175,19 @@ CalibrationResult calibrate(const std::vector<Scene>& scenes,
   const Alignment alignment(camera, std::move(preparation.scenes));
   for (const auto& scene : alignment.scenes()) result.lidar_edges += scene.lidar.edges.size();
   const TranslationPrior prior{T_camera_lidar_guess.translation(), config.translation_sigma_m};
+  Contest contest{T_camera_lidar_guess, {}, prior, 0.0};
+  contest.reach_px = final_reach_px(alignment, 1.5);
   if (config.method == "camvox") {
     const CamvoxCost cost(scenes.front(), camera, config.camvox);
     result.T_camera_lidar = camvox_descend(cost, T_camera_lidar_guess, config.camvox, stop);
   } else {
-    result.T_camera_lidar =
+    const auto places =
         find(alignment, T_camera_lidar_guess, prior, config.max_rotation_deg * kDegree, stop);
-    for (const double scale_px : {4.0, 2.5, 1.5}) {
-      if (stop.stop_requested()) break;
-      const double reach_px = final_reach_px(alignment, intrinsics.fx_px, scale_px);
-      result.T_camera_lidar = alignment.refine(result.T_camera_lidar, reach_px, prior);
-    }
+    if (!places.empty()) result.T_camera_lidar = refine(alignment, places[0], prior, stop);
+    contest.rival = rival_of(alignment, result.T_camera_lidar, places, prior, stop);
   }
   if (stop.stop_requested()) return ended(CalibrationStatus::kCancelled);
-  const double reach_px = final_reach_px(alignment, intrinsics.fx_px, 1.5);
-  cross_validate(alignment, T_camera_lidar_guess, prior, reach_px, result);
+  examine(alignment, contest, result);
   if (stop.stop_requested()) return ended(CalibrationStatus::kCancelled);
   add_other_costs(scenes, camera, T_camera_lidar_guess, config.camvox, result);
   if (stop.stop_requested()) return ended(CalibrationStatus::kCancelled);
@@ -252,18 +216,19 @@ std::string report_text(const CalibrationResult& r) {
       q.z(),
       q.w());
   std::string report = text;
-  report += number("one sigma of the worst axis: %.3f deg, %.4f m\n",
-                   r.sigma_rotation_deg,
-                   r.sigma_translation_m);
+  report += line("one sigma of the worst axis: %.3f deg, %.4f m\n",
+                 r.sigma_rotation_deg,
+                 r.sigma_translation_m);
   report +=
-      number("score (gain over chance): %.3f before, %.3f after\n", r.score_before, r.score_after);
-  report += number(
+      line("score (gain over chance): %.3f before, %.3f after\n", r.score_before, r.score_after);
+  report += line(
       "score on held-back data: %.3f before, %.3f after\n", r.held_back_before, r.held_back_after);
-  report += number("NID: %.4f before, %.4f after\n", r.nid_before, r.nid_after);
+  report += line("NID: %.4f before, %.4f after\n", r.nid_before, r.nid_after);
   report +=
-      number("CamVox cost: %.2f before, %.2f after\n", r.camvox_cost_before, r.camvox_cost_after);
-  report += number(
-      "inlier share %.2f, halves disagree by %.3f deg\n", r.inlier_share, r.disagreement_deg);
+      line("CamVox cost: %.2f before, %.2f after\n", r.camvox_cost_before, r.camvox_cost_after);
+  report +=
+      line("inlier share %.2f, halves disagree by %.3f deg\n", r.inlier_share, r.disagreement_deg);
+  report += line("%.2f of a perfect fit, the next best place %.2f\n", r.fit, r.rival_fit);
   return report + (r.accepted ? "accepted\n" : "refused: " + r.reason + "\n");
 }
 

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 #include <opencv2/imgproc.hpp>
+#include <utility>
 
 namespace camvox::calibration {
 namespace {
@@ -16,15 +18,17 @@ constexpr std::size_t kMinPoints = 1000;
 constexpr std::size_t kMinLidarEdges = 150;
 constexpr std::size_t kMinImageEdges = 500;
 
-std::vector<Part> chessboard(const LidarEdges& lidar, const LidarView& view) {
-  std::vector<Part> parts;
-  for (const LidarEdge& edge : lidar.edges) {
+/// Numbers the tiles of a chessboard over the view in which there are edges.
+void lay_chessboard(const LidarView& view, PreparedScene& scene) {
+  std::map<std::pair<int, int>, std::size_t> tiles;
+  for (const LidarEdge& edge : scene.lidar.edges) {
     const Eigen::Vector3d p = view.R_view_lidar * edge.p_lidar;
     const auto column = static_cast<int>(std::floor(std::atan2(p.x(), p.z()) / kTile_rad));
     const auto row = static_cast<int>(std::floor(std::atan2(p.y(), p.z()) / kTile_rad));
-    parts.push_back(((column + row) & 1) != 0 ? Part::kOdd : Part::kEven);
+    scene.parts.push_back(((column + row) & 1) != 0 ? Part::kOdd : Part::kEven);
+    scene.tiles.push_back(tiles.try_emplace({row, column}, tiles.size()).first->second);
   }
-  return parts;
+  scene.tile_count = tiles.size();
 }
 
 /// Appends one scene, or tells what is wrong with it.
@@ -60,8 +64,8 @@ CalibrationStatus prepare_one(const Scene& scene,
     fields.emplace_back(image.ridges(), grey.size(), sigma_px);
   }
   if (fine_px < coarse_px) image = ImageEdges(grey, fine_px);
-  std::vector<Part> parts = chessboard(lidar, view);
-  prepared.push_back({std::move(lidar), std::move(image), std::move(fields), std::move(parts)});
+  prepared.push_back({std::move(lidar), std::move(image), std::move(fields), {}, {}, 0});
+  lay_chessboard(view, prepared.back());
   return CalibrationStatus::kDone;
 }
 

@@ -43,20 +43,26 @@ void Tally::add(const BenchCase& bench_case,
   cost_after_.push_back(result.camvox_cost_after);
   if (result.accepted && error_deg > limits_.bad_deg) ++bad_applied_;
   if (!result.accepted && error_deg <= limits_.good_deg) ++good_refused_;
-  std::fprintf(stderr,
-               "%s: %.3f deg, %.3f m, sigma %.3f deg, score %.2f/%.2f, held back %.2f/%.2f, inlier "
-               "%.2f, halves %.3f deg: %s\n",
-               bench_case.name.c_str(),
-               error_deg,
-               error.tail<3>().norm(),
-               result.sigma_rotation_deg,
-               result.score_before,
-               result.score_after,
-               result.held_back_before,
-               result.held_back_after,
-               result.inlier_share,
-               result.disagreement_deg,
-               result.accepted ? "accepted" : result.reason.c_str());
+  std::fprintf(
+      stderr,
+      "%s: %.3f deg, %.3f m, sigma %.3f deg, score %.2f/%.2f, held back %.2f/%.2f +- "
+      "%.2f, fit %.2f +- %.2f, rival %.2f by %.1f sigma, inlier %.2f, halves %.3f deg: %s\n",
+      bench_case.name.c_str(),
+      error_deg,
+      error.tail<3>().norm(),
+      result.sigma_rotation_deg,
+      result.score_before,
+      result.score_after,
+      result.held_back_before,
+      result.held_back_after,
+      result.held_back_error,
+      result.fit,
+      result.fit_error,
+      result.rival_fit,
+      result.lead,
+      result.inlier_share,
+      result.disagreement_deg,
+      result.accepted ? "accepted" : result.reason.c_str());
   if (error_deg > limits_.bad_deg || !(result.sigma_rotation_deg > 0.0)) return;
   sigma_deg_.push_back(result.sigma_rotation_deg);
   normalised_.push_back(error.dot(result.covariance_lidar.ldlt().solve(error)) / 6.0);

@@ -14,19 +14,27 @@
 
 namespace camvox::calibration {
 
-/// When a result replaces the extrinsics in force. YAML keys are the field names.
+/// When a result replaces the extrinsics in force. What a result must reach follows from what its
+/// data can tell: significance is in standard errors, from the spread over the view, and a lidar
+/// that sees less sharply may know less. YAML keys are the field names.
 struct GateConfig {
-  double max_disagreement_deg = 0.2;  ///< Between the result and those of independent halves.
-  double min_score = 0.3;             ///< Gain over chance, nats per edge; a wrong fit has less.
-  double min_inlier_share = 0.5;      ///< Of the lidar's edges that found an image edge.
-  double max_sigma_deg = 0.1;         ///< Of the worst-known axis of rotation.
+  double min_fit = 0.15;          ///< Of a perfect fit.
+  double min_significance = 2.0;  ///< Of the fit, in standard errors.
+  double max_rival = 0.6;         ///< Fit of the best other place, of that of the result;
+  double min_lead = 3.0;          ///< unless the result leads by this many standard errors.
+  double min_gain = 2.0;          ///< Over the old extrinsics on held-back data, standard errors.
+  double max_sigma_deg = 0.1;     ///< Of the worst-known axis of rotation, for a dense lidar;
+  double max_sigma = 0.6;         ///< for a sparse one this many times its resolution.
 
   template <typename Self, typename Visitor>
   static void visit(Self& self, Visitor&& field) {
-    field("max_disagreement_deg", self.max_disagreement_deg, config::greater_than(0.0));
-    field("min_score", self.min_score, config::at_least(-10.0));
-    field("min_inlier_share", self.min_inlier_share, config::at_least(0.0), config::at_most(1.0));
+    field("min_fit", self.min_fit, config::at_least(0.0), config::at_most(1.0));
+    field("min_significance", self.min_significance, config::at_least(0.0));
+    field("max_rival", self.max_rival, config::at_least(0.0), config::at_most(1.0));
+    field("min_lead", self.min_lead, config::at_least(0.0));
+    field("min_gain", self.min_gain, config::at_least(0.0));
     field("max_sigma_deg", self.max_sigma_deg, config::greater_than(0.0));
+    field("max_sigma", self.max_sigma, config::at_least(0.0));
   }
 };
 
@@ -81,7 +89,13 @@ struct CalibrationResult {
   double score_after = 0.0;
   double held_back_before = 0.0;  ///< The same, on the half that a fit did not see.
   double held_back_after = 0.0;
-  double nid_before = 1.0;  ///< Normalised information distance, 0 to 1: lower is better.
+  double held_back_error = 0.0;  ///< Standard error of their difference.
+  double fit = 0.0;              ///< Gain over chance, of what a perfect fit would gain: 0 to 1.
+  double fit_error = 0.0;        ///< Its standard error.
+  double rival_fit = 0.0;        ///< The same of the best of the other places that were tried.
+  double lead = 0.0;             ///< Over that one, in standard errors of the difference.
+  double resolution_deg = 0.0;   ///< How sharply the lidar sees: sigma.
+  double nid_before = 1.0;       ///< Normalised information distance, 0 to 1: lower is better.
   double nid_after = 1.0;
   double camvox_cost_before = 0.0;  ///< The paper's cost, px; of the first scene.
   double camvox_cost_after = 0.0;

@@ -9,9 +9,10 @@
 
 namespace camvox::calibration {
 
-/// The image, darkened, with the lidar's edges drawn over it under the given extrinsics: green
+/// The image in dim grey, with the lidar's edges drawn over it under the given extrinsics: green
 /// where reflectivity changes, red where a nearer surface ends. They lie on the edges of the image
-/// when the extrinsics are right. BGR.
+/// when the extrinsics are right: below it three details (framed in the image) are magnified, where
+/// one sees a pixel. BGR; as wide as the image, and higher.
 [[nodiscard]] cv::Mat draw_overlay(const Scene& scene,
                                    const sensors::CameraIntrinsics& intrinsics,
                                    const geometry::SE3& T_camera_lidar,
