@@ -1,6 +1,8 @@
 #include "camvox/calibration_component/calibration_component.hpp"
 
-#include <cstring>
+#include <filesystem>
+#include <iterator>
+#include <utility>
 
 #include "camvox/calibration_component/rig_file.hpp"
 #include "camvox/conversion/image.hpp"
@@ -10,6 +12,8 @@ namespace camvox {
 namespace {
 
 constexpr std::size_t kMaxPoints = 2'000'000;
+/// Frames of which one half waits for the other: as many as a lockstep replay has under way.
+constexpr std::size_t kFramesKept = 8;
 constexpr std::string_view kRequestTopic = "/camvox/calibrate";
 
 cv::Mat copy_of(const camvox_interfaces::msg::FrameImage& image) {
@@ -30,17 +34,24 @@ CalibrationComponent::CalibrationComponent(Context& context)
       config_(context.parameters<CalibrationComponentConfig>()),
       rig_(sensors::make_rig_calibration(config_.rig)),
       T_camera_lidar_(rig_.T_camera_lidar()),
+      progress_(context),
       extrinsics_(context.advertise<Extrinsics>({"extrinsics", topics::kExtrinsics},
                                                 {.qos = qos::kState})) {
   if (auto problems = sensors::check(config_.camera); !problems.empty()) {
     throw config::ConfigError(std::move(problems));
   }
-  context.subscribe<FrameImage>({"frame_image", topics::kFrameImage},
-                                [this](const auto& image) { on_image(*image); },
-                                {.qos = qos::kFrames});
-  context.subscribe<Cloud>({"cloud", topics::kCloud},
-                           [this](const auto& cloud) { on_cloud(*cloud); },
-                           {.qos = qos::kFrames});
+  const SubscribeOptions frames{.qos = qos::kFrames, .max_held = kFramesKept};
+  context.subscribe<FrameImage>(
+      {"frame_image", topics::kFrameImage},
+      [this](const auto& image) { keep(images_, image); },
+      frames);
+  context.subscribe<Cloud>(
+      {"cloud", topics::kCloud},
+      [this](const auto& cloud) {
+        if (cloud->stationary() == 0) cancel();
+        keep(clouds_, cloud);
+      },
+      frames);
   context.subscribe<std_msgs::msg::Header>({"calibrate", kRequestTopic},
                                            [this](const auto&) {
                                              requested_ = true;
@@ -56,37 +67,50 @@ CalibrationComponent::CalibrationComponent(Context& context)
   context.diagnostics().report(HealthLevel::kOk, "waiting for a standstill");
 }
 
+template <typename Message>
+void CalibrationComponent::keep(std::map<std::uint64_t, Sample<Message>>& frames,
+                                const Sample<Message>& sample) {
+  const auto work = progress_.measure();
+  const auto frame_id = sample->header().frame_id();
+  frames.insert_or_assign(frame_id, sample);
+  while (frames.size() >= kFramesKept) frames.erase(frames.begin());
+  const auto image = images_.find(frame_id);
+  const auto cloud = clouds_.find(frame_id);
+  if (image == images_.end() || cloud == clouds_.end()) return;
+  const auto header = cloud->second->header();
+  add(*image->second, *cloud->second);
+  images_.erase(images_.begin(), std::next(image));
+  clouds_.erase(clouds_.begin(), std::next(cloud));
+  progress_.done(header);
+}
+
 bool CalibrationComponent::wanted(std::int64_t stamp_ns) const {
-  if (!standing_ || done_here_ || job_.busy()) return false;
+  if (done_here_ || job_.busy()) return false;
   if (requested_) return true;
   const auto interval_ns = static_cast<std::int64_t>(1e9 * config_.min_interval_s);
   return config_.automatic && (!last_run_ns_ || stamp_ns - *last_run_ns_ >= interval_ns);
 }
 
-void CalibrationComponent::on_image(const FrameImage& image) {
-  if (!wanted(image.header().stamp_ns()) || !scene_.image.empty()) return;
-  if (!conversion::is_well_formed(image)) return;
-  scene_.image = copy_of(image);
-}
-
-void CalibrationComponent::on_cloud(const Cloud& cloud) {
-  if (cloud.stationary() == 0) return on_motion();
-  standing_ = true;
-  if (!wanted(cloud.header().stamp_ns())) return;
-  if (!first_ns_) first_ns_ = cloud.header().stamp_ns();
+void CalibrationComponent::add(const FrameImage& image, const Cloud& cloud) {
+  const auto stamp_ns = cloud.header().stamp_ns();
+  const bool standing = cloud.stationary() != 0;
+  if (!standing) done_here_ = false;
+  if (!standing || !wanted(stamp_ns)) {
+    first_ns_.reset();
+    scene_ = {};
+    return;
+  }
+  if (!first_ns_) first_ns_ = stamp_ns;
+  if (scene_.image.empty() && conversion::is_well_formed(image)) scene_.image = copy_of(image);
   for (std::uint32_t i = 0; i < cloud.points_count(); ++i) {
     if (scene_.points_lidar.size() >= kMaxPoints) break;
     scene_.points_lidar.emplace_back(cloud.points()[i].data());
   }
-  const auto collected_s = 1e-9 * static_cast<double>(cloud.header().stamp_ns() - *first_ns_);
-  if (collected_s >= config_.collect_s && !scene_.image.empty()) start_job(cloud.header());
+  const auto collected_s = 1e-9 * static_cast<double>(stamp_ns - *first_ns_);
+  if (collected_s >= config_.collect_s && !scene_.image.empty()) calibrate(cloud.header());
 }
 
-void CalibrationComponent::on_motion() {
-  standing_ = false;
-  done_here_ = false;
-  first_ns_.reset();
-  scene_ = {};
+void CalibrationComponent::cancel() {
   if (!job_.busy()) return;
   job_.cancel();
   ++run_;
@@ -94,20 +118,21 @@ void CalibrationComponent::on_motion() {
   context_.diagnostics().report(HealthLevel::kOk, "cancelled by motion");
 }
 
-void CalibrationComponent::start_job(const camvox_interfaces::msg::MessageHeader& header) {
+void CalibrationComponent::calibrate(const camvox_interfaces::msg::MessageHeader& header) {
   context_.diagnostics().report(HealthLevel::kOk, "calibrating");
   header_ = header;
   last_run_ns_ = header.stamp_ns();
   done_here_ = true;
-  job_.start({std::exchange(scene_, {}),
-              config_.camera,
-              T_camera_lidar_,
-              config_.calibration,
-              config_.overlay_folder},
-             [this, run = ++run_](const calibration::CalibrationResult& result) {
-               context_.post([this, run, result] { finish(run, result); });
-             });
   first_ns_.reset();
+  calibration_component::CalibrationTask task{std::exchange(scene_, {}),
+                                              config_.camera,
+                                              T_camera_lidar_,
+                                              config_.calibration,
+                                              config_.output_dir};
+  if (config_.lockstep) return finish(++run_, calibration_component::perform(task));
+  job_.start(std::move(task), [this, run = ++run_](const calibration::CalibrationResult& result) {
+    context_.post([this, run, result] { finish(run, result); });
+  });
 }
 
 void CalibrationComponent::finish(std::uint64_t run, const calibration::CalibrationResult& result) {
@@ -119,6 +144,7 @@ void CalibrationComponent::finish(std::uint64_t run, const calibration::Calibrat
   }
   context_.log().info("{}", calibration::report_text(result));
   publish(result);
+  save(result);
   auto& diagnostics = context_.diagnostics();
   diagnostics.set("score before", result.score_before);
   diagnostics.set("score after", result.score_after);
@@ -127,7 +153,8 @@ void CalibrationComponent::finish(std::uint64_t run, const calibration::Calibrat
   diagnostics.set("sigma deg", result.sigma_rotation_deg);
   diagnostics.set("accepted", accepted_);
   diagnostics.set("refused", refused_);
-  diagnostics.report(HealthLevel::kOk, result.accepted ? "accepted" : "refused: " + result.reason);
+  const auto* accepted = config_.lockstep ? "passed the gate, proposed" : "accepted";
+  diagnostics.report(HealthLevel::kOk, result.accepted ? accepted : "refused: " + result.reason);
 }
 
 void CalibrationComponent::publish(const calibration::CalibrationResult& result) {
@@ -138,28 +165,35 @@ void CalibrationComponent::publish(const calibration::CalibrationResult& result)
   message.covariance_lidar(conversion::to_array(result.covariance_lidar));
   message.cost_before(-result.held_back_before);
   message.cost_after(-result.held_back_after);
-  message.applied(result.accepted ? 1 : 0);
+  const bool applied = result.accepted && !config_.lockstep;
+  message.applied(applied ? 1 : 0);
   extrinsics_.publish(message);
-  if (!result.accepted) {
-    ++refused_;
+  ++(result.accepted ? accepted_ : refused_);
+  if (applied) {
+    ++version_;
+    in_force_ = message;
+    T_camera_lidar_ = result.T_camera_lidar;
+  } else if (in_force_) {
     // Late readers get the last message: it must be the one in force.
-    if (in_force_) extrinsics_.publish(*in_force_);
-    return;
+    extrinsics_.publish(*in_force_);
   }
-  ++accepted_;
-  ++version_;
-  in_force_ = message;
-  T_camera_lidar_ = result.T_camera_lidar;
-  if (!config_.rig_file.empty()) save_rig();
 }
 
-void CalibrationComponent::save_rig() {
+void CalibrationComponent::save(const calibration::CalibrationResult& result) {
   // The camera stays where it is on the robot; the lidar, and the IMU with it, move.
-  rig_.T_lidar_camera = T_camera_lidar_.inverse();
-  const std::string problem = calibration_component::write_rig_file(
-      config_.rig_file,
-      calibration_component::rig_file_text(config_.camera, sensors::to_config(rig_)));
-  if (!problem.empty()) context_.log().error("{}", problem);
+  auto rig = rig_;
+  if (result.accepted) rig.T_lidar_camera = result.T_camera_lidar.inverse();
+  const auto text = calibration_component::rig_file_text(config_.camera, sensors::to_config(rig));
+  const auto write = [&](const std::filesystem::path& path, const std::string& content) {
+    const auto problem = calibration_component::write_rig_file(path, content);
+    if (!problem.empty()) context_.log().error("{}", problem);
+  };
+  if (!config_.output_dir.empty()) {
+    write(std::filesystem::path(config_.output_dir) / "calibration.yaml",
+          calibration_component::as_comment(calibration::report_text(result)) + text);
+  }
+  if (!config_.rig_file.empty() && result.accepted) write(config_.rig_file, text);
+  if (result.accepted && !config_.lockstep) rig_ = rig;
 }
 
 }  // namespace camvox

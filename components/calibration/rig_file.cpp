@@ -1,6 +1,7 @@
 #include "camvox/calibration_component/rig_file.hpp"
 
 #include <fstream>
+#include <sstream>
 #include <system_error>
 
 #include "camvox/config/parameters.hpp"
@@ -30,6 +31,13 @@ std::string rig_file_text(const sensors::CameraIntrinsics& camera, const sensors
   append("camera", camera, text);
   append("rig", rig, text);
   return text;
+}
+
+std::string as_comment(const std::string& text) {
+  std::istringstream lines(text);
+  std::string comment;
+  for (std::string line; std::getline(lines, line);) comment += "# " + line + "\n";
+  return comment;
 }
 
 std::string write_rig_file(const std::filesystem::path& path, const std::string& text) {

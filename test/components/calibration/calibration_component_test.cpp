@@ -18,10 +18,16 @@ namespace {
 using camvox_interfaces::msg::Cloud;
 using camvox_interfaces::msg::Extrinsics;
 using camvox_interfaces::msg::FrameImage;
+using ::testing::EndsWith;
 using ::testing::HasSubstr;
 namespace fs = std::filesystem;
 
 constexpr std::int64_t kSecond_ns = 1'000'000'000;
+
+std::string text_of(const fs::path& path) {
+  std::ifstream file(path);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
 
 const calibration::Scene& corridor() {
   static const calibration::Scene scene = test::look_from({"corridor", 1, 6.0, 0.0, 0.0}, 1);
@@ -45,13 +51,17 @@ class CalibrationComponentTest : public ::testing::Test {
     folder_ = fs::temp_directory_path() / ("camvox_calibration_" + std::to_string(getpid()));
     fs::create_directories(folder_);
     fake_.set_parameter("rig_file", (folder_ / "rig.yaml").string());
-    fake_.set_parameter("overlay_folder", (folder_ / "pictures").string());
+    fake_.set_parameter("output_dir", (folder_ / "results").string());
   }
   ~CalibrationComponentTest() override { fs::remove_all(folder_); }
 
+  static std::uint64_t frame_of(std::int64_t stamp_ns) {
+    return 1 + static_cast<std::uint64_t>(10 * stamp_ns / kSecond_ns);
+  }
   void send_cloud(std::int64_t stamp_ns, bool stationary, bool with_points) {
     fake_.send<Cloud>("cloud", [&](Cloud& cloud) {
       cloud.header().stamp_ns(stamp_ns);
+      cloud.header().frame_id(frame_of(stamp_ns));
       cloud.stationary(stationary ? 1 : 0);
       const auto& points = corridor().points_lidar;
       const std::size_t count = with_points ? points.size() : 0;
@@ -65,6 +75,7 @@ class CalibrationComponentTest : public ::testing::Test {
     fake_.send<FrameImage>("frame_image", [&](FrameImage& message) {
       const cv::Mat& image = corridor().image;
       message.header().stamp_ns(stamp_ns);
+      message.header().frame_id(frame_of(stamp_ns));
       message.width_px(static_cast<std::uint32_t>(image.cols));
       message.height_px(static_cast<std::uint32_t>(image.rows));
       message.row_step_bytes(static_cast<std::uint32_t>(3 * image.cols));
@@ -75,9 +86,10 @@ class CalibrationComponentTest : public ::testing::Test {
     });
   }
   void stand_still() {
+    send_image(0);
     send_cloud(0, true, true);
-    send_image(kSecond_ns / 2);
-    send_cloud(kSecond_ns, true, false);
+    send_cloud(kSecond_ns, true, false);  // the two of a frame come in any order
+    send_image(kSecond_ns);
   }
 
   FakeContext fake_{"calibration"};
@@ -98,16 +110,41 @@ TEST_F(CalibrationComponentTest, AppliesABetterResultAtStandstill) {
       (T.rotation().inverse() * test::true_T_camera_lidar().rotation()).angle_rad();
   EXPECT_LT(error_rad * 180.0 / std::numbers::pi, 0.1);
 
-  std::ifstream rig(folder_ / "rig.yaml");
-  const std::string text{std::istreambuf_iterator<char>(rig), {}};
+  const std::string text = text_of(folder_ / "rig.yaml");
   EXPECT_THAT(text, HasSubstr("camera:\n"));
   EXPECT_THAT(text, HasSubstr("rig:\n"));
   EXPECT_THAT(text, HasSubstr("  T_lidar_camera:\n    rotation_xyzw: ["));
-  EXPECT_TRUE(fs::exists(folder_ / "pictures" / "before.png"));
-  EXPECT_TRUE(fs::exists(folder_ / "pictures" / "after.png"));
+  const auto results = folder_ / "results";
+  EXPECT_TRUE(fs::exists(results / "calibration_before.png"));
+  EXPECT_TRUE(fs::exists(results / "calibration_after.png"));
+  const std::string verdict = text_of(results / "calibration.yaml");
+  EXPECT_THAT(verdict, HasSubstr("# accepted\n"));
+  EXPECT_THAT(verdict, EndsWith(text));
 
   stand_still();  // the same standstill: nothing more to do
   EXPECT_EQ(fake_.run_posted(), 0U);
+}
+
+TEST_F(CalibrationComponentTest, InLockstepItComputesAtOnceAndOnlyProposes) {
+  fake_.set_parameter("lockstep", true);
+  CalibrationComponent component(fake_);
+  stand_still();
+  const auto published = fake_.published<Extrinsics>("extrinsics");
+  ASSERT_EQ(published.size(), 1U);  // without waiting for a thread
+  EXPECT_EQ(fake_.run_posted(), 0U);
+  EXPECT_EQ(published[0]->applied(), 0);
+  EXPECT_THAT(fake_.diagnostics().status().message, HasSubstr("proposed"));
+  EXPECT_THAT(text_of(folder_ / "results" / "calibration.yaml"), HasSubstr("# accepted\n"));
+  // One for each frame, so that a replay can wait.
+  EXPECT_EQ(fake_.published<camvox_interfaces::msg::Progress>("progress").size(), 2U);
+}
+
+TEST_F(CalibrationComponentTest, AFrameThatIsNotWholeIsLeftBehind) {
+  CalibrationComponent component(fake_);
+  for (int i = 0; i < 20; ++i) send_cloud(i * kSecond_ns, false, false);
+  send_image(19 * kSecond_ns);
+  EXPECT_EQ(fake_.published<camvox_interfaces::msg::Progress>("progress").size(), 1U);
+  fake_.verify_nothing_left();
 }
 
 TEST_F(CalibrationComponentTest, MotionCancels) {

@@ -15,8 +15,12 @@ struct CalibrationTask {
   sensors::CameraIntrinsics camera;
   geometry::SE3 T_camera_lidar;
   calibration::CalibrationConfig config;
-  std::string picture_folder;  ///< For before.png and after.png; "": none.
+  std::string picture_folder;  ///< For calibration_before.png and _after.png; "": none.
 };
+
+/// Calibrates and draws the pictures. A task that fails has a result without numbers.
+[[nodiscard]] calibration::CalibrationResult perform(const CalibrationTask& task,
+                                                     const std::stop_token& stop = {});
 
 /// Runs calibrations on a thread of its own, one at a time.
 class CalibrationJob {

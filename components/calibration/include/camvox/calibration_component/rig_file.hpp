@@ -12,6 +12,9 @@ namespace camvox::calibration_component {
 [[nodiscard]] std::string rig_file_text(const sensors::CameraIntrinsics& camera,
                                         const sensors::RigConfig& rig);
 
+/// Lines of text as comments for the top of such a file.
+[[nodiscard]] std::string as_comment(const std::string& text);
+
 /// Writes it beside the old file, then replaces that one in a single step. Returns what went wrong,
 /// or "".
 [[nodiscard]] std::string write_rig_file(const std::filesystem::path& path,
