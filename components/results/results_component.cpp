@@ -98,9 +98,12 @@ void ResultsComponent::add_pose(const FramePose& pose) {
                        pose.state() == camvox_interfaces::msg::TRACKING_LOCALISATION_ONLY;
   if (!tracked) return;
   const auto stamp_ns = pose.header().stamp_ns();
-  path_.add_frame(
-      {stamp_ns, pose.reference_keyframe_id(), conversion::to_se3(pose.T_keyframe_camera())});
-  odometry_.push_back({stamp_ns, conversion::to_se3(pose.T_map_camera())});
+  const auto T_map_camera = conversion::to_se3(pose.T_map_camera());
+  path_.add_frame({stamp_ns,
+                   pose.reference_keyframe_id(),
+                   conversion::to_se3(pose.T_keyframe_camera()),
+                   T_map_camera});
+  odometry_.push_back({stamp_ns, T_map_camera});
 }
 
 void ResultsComponent::add_update(const MapUpdate& update) {

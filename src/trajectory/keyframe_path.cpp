@@ -40,8 +40,11 @@ Trajectory KeyframePath::frames() const {
   trajectory.reserve(poses_.size());
   for (const auto& pose : poses_) {
     const auto keyframe = keyframes_.find(pose.keyframe_id);
-    if (keyframe == keyframes_.end()) continue;
-    trajectory.push_back({pose.stamp_ns, keyframe->second.T_map_camera * pose.T_keyframe_camera});
+    if (keyframe != keyframes_.end()) {
+      trajectory.push_back({pose.stamp_ns, keyframe->second.T_map_camera * pose.T_keyframe_camera});
+    } else if (pose.T_map_camera) {
+      trajectory.push_back({pose.stamp_ns, *pose.T_map_camera});
+    }
   }
   return trajectory;
 }

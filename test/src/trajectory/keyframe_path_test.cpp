@@ -67,5 +67,13 @@ TEST(KeyframePath, UnknownKeyframesAndOldFramesAreLeftOut) {
   EXPECT_TRUE(KeyframePath().frames().empty());
 }
 
+TEST(KeyframePath, WhatTrackingSaidStandsInForAnUnknownKeyframe) {
+  auto front_end = path();
+  front_end.add_frame({23, 9, at(0.0), at(7.0)});
+  EXPECT_EQ(x_of(front_end.frames()), (std::vector<double>{1.0, 3.0, 12.0, 7.0}));
+  front_end.add_keyframe(9, 23, at(8.0));
+  EXPECT_EQ(x_of(front_end.frames()), (std::vector<double>{1.0, 3.0, 12.0, 8.0}));
+}
+
 }  // namespace
 }  // namespace camvox::trajectory

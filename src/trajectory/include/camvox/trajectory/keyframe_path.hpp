@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <vector>
 
 #include "camvox/trajectory/trajectory.hpp"
@@ -13,6 +14,8 @@ struct AnchoredPose {
   std::int64_t stamp_ns = 0;
   std::uint64_t keyframe_id = 0;
   geometry::SE3 T_keyframe_camera;
+  /// As tracking said it; stands where the keyframe is not known (of a map loaded elsewhere).
+  std::optional<geometry::SE3> T_map_camera = {};
 };
 
 /// The path of all frames, each hung on its reference keyframe, so that it follows what bundle
@@ -29,7 +32,7 @@ class KeyframePath {
   /// the relative pose of this moment.
   void remove_keyframe(std::uint64_t id);
 
-  /// T_map_camera of every frame whose keyframe is known, as of now.
+  /// T_map_camera of every frame as of now; without those whose pose is not known in any way.
   [[nodiscard]] Trajectory frames() const;
   [[nodiscard]] Trajectory keyframes() const;
 
