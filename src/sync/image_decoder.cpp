@@ -39,29 +39,19 @@ cv::Mat view(const ImageTarget& target) {
           row_step_bytes(target.width_px, target.format)};
 }
 
-/// U and V, full range ITU-R BT.601 as in JPEG: mean of each 2x2 block; clamped at the border.
+/// U and V, full range ITU-R BT.601 as in JPEG: of the mean of each 2x2 block; clamped at the
+/// border.
 void write_chroma(const cv::Mat& bgr, const ImageTarget& target) {
-  const int half_width = even(bgr.cols) / 2, half_height = even(bgr.rows) / 2;
-  std::uint8_t* u = target.data.data() + row_step_bytes(bgr.cols, target.format) *
-                                             static_cast<std::size_t>(even(bgr.rows));
-  std::uint8_t* v = u + half_width * half_height;
-  for (int row = 0; row < half_height; ++row) {
-    const auto* top = bgr.ptr<std::uint8_t>(2 * row);
-    const auto* bottom = bgr.ptr<std::uint8_t>(std::min(2 * row + 1, bgr.rows - 1));
-    for (int column = 0; column < half_width; ++column) {
-      const int left = 3 * 2 * column, right = 3 * std::min(2 * column + 1, bgr.cols - 1);
-      const auto sum = [&](int channel) {
-        return top[left + channel] + top[right + channel] + bottom[left + channel] +
-               bottom[right + channel];
-      };
-      const int b = sum(0), g = sum(1), r = sum(2);
-      constexpr int kShift = 18, kHalf = (128 << kShift) + (1 << (kShift - 1));
-      *u++ = static_cast<std::uint8_t>(
-          std::clamp((-11059 * r - 21709 * g + 32768 * b + kHalf) >> kShift, 0, 255));
-      *v++ = static_cast<std::uint8_t>(
-          std::clamp((32768 * r - 27439 * g - 5329 * b + kHalf) >> kShift, 0, 255));
-    }
+  cv::Mat whole = bgr, half, luma_v_u;
+  if (bgr.rows % 2 != 0 || bgr.cols % 2 != 0) {
+    cv::copyMakeBorder(bgr, whole, 0, bgr.rows % 2, 0, bgr.cols % 2, cv::BORDER_REPLICATE);
   }
+  cv::resize(whole, half, whole.size() / 2, 0.0, 0.0, cv::INTER_AREA);
+  cv::cvtColor(half, luma_v_u, cv::COLOR_BGR2YCrCb);
+  std::uint8_t* planes = target.data.data() + row_step_bytes(bgr.cols, target.format) *
+                                                  static_cast<std::size_t>(whole.rows);
+  cv::extractChannel(luma_v_u, cv::Mat(half.size(), CV_8UC1, planes), 2);
+  cv::extractChannel(luma_v_u, cv::Mat(half.size(), CV_8UC1, planes + half.total()), 1);
 }
 
 /// An image in some colour order, to grey and to BGR by OpenCV's conversions; < 0: as it is.
