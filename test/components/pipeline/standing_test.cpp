@@ -17,7 +17,7 @@ double mean_m(const std::vector<JudgedFrame>& frames, double from_s, double to_s
   return sum_m / count;
 }
 
-// A minute of it, with a camera of the real size, is bench/robustness/standstill.
+// A minute of it is bench/robustness/standstill_bench.
 TEST(Standstill, MakesNoKeyframesAndDoesNotDrift) {
   const Recording recording("standstill", 5.0);
   Pipeline pipeline(recording);
