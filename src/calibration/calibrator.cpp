@@ -110,17 +110,22 @@ void add_other_costs(const std::vector<Scene>& scenes,
                      const sensors::CameraModel& camera,
                      const SE3& guess,
                      const CamvoxMethodConfig& config,
+                     const std::stop_token& stop,
                      CalibrationResult& result) {
   result.nid_before = 0.0;
   result.nid_after = 0.0;
   for (const Scene& scene : scenes) {
+    if (stop.stop_requested()) return;
     const auto share = 1.0 / static_cast<double>(scenes.size());
     result.nid_before += share * normalised_information_distance(scene, camera, guess);
     result.nid_after +=
         share * normalised_information_distance(scene, camera, result.T_camera_lidar);
   }
+  if (stop.stop_requested()) return;
   const CamvoxCost cost(scenes.front(), camera, config);
+  if (stop.stop_requested()) return;
   result.camvox_cost_before = cost(guess);
+  if (stop.stop_requested()) return;
   result.camvox_cost_after = cost(result.T_camera_lidar);
 }
 
@@ -175,7 +180,7 @@ CalibrationResult calibrate(const std::vector<Scene>& scenes,
   const Alignment alignment(camera, std::move(preparation.scenes));
   for (const auto& scene : alignment.scenes()) result.lidar_edges += scene.lidar.edges.size();
   const TranslationPrior prior{T_camera_lidar_guess.translation(), config.translation_sigma_m};
-  Contest contest{T_camera_lidar_guess, {}, prior, 0.0};
+  Contest contest{T_camera_lidar_guess, {}, prior, 0.0, stop};
   contest.reach_px = final_reach_px(alignment, 1.5);
   if (config.method == "camvox") {
     const CamvoxCost cost(scenes.front(), camera, config.camvox);
@@ -189,7 +194,7 @@ CalibrationResult calibrate(const std::vector<Scene>& scenes,
   if (stop.stop_requested()) return ended(CalibrationStatus::kCancelled);
   examine(alignment, contest, result);
   if (stop.stop_requested()) return ended(CalibrationStatus::kCancelled);
-  add_other_costs(scenes, camera, T_camera_lidar_guess, config.camvox, result);
+  add_other_costs(scenes, camera, T_camera_lidar_guess, config.camvox, stop, result);
   if (stop.stop_requested()) return ended(CalibrationStatus::kCancelled);
   result.status = CalibrationStatus::kDone;
   result.reason = objection(result, config.gate);

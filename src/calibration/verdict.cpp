@@ -107,8 +107,11 @@ void examine(const Alignment& alignment, const Contest& contest, CalibrationResu
     return alignment.refine(
         alignment.climb(T, level, contest.prior, part), contest.reach_px, contest.prior, part);
   };
+  const auto stopped = [&] { return contest.stop.stop_requested(); };
   const SE3 even = fit(Part::kEven);
+  if (stopped()) return;
   const SE3 odd = fit(Part::kOdd);
+  if (stopped()) return;
   result.disagreement_deg = std::max(angle_deg(even, T), angle_deg(odd, T));
   const SE3& guess = contest.guess;
   result.held_back_before = 0.5 * (alignment.score(guess, level, Part::kOdd) +
@@ -119,6 +122,7 @@ void examine(const Alignment& alignment, const Contest& contest, CalibrationResu
   result.held_back_error = 0.5 * std::hypot(gain_odd.standard_error, gain_even.standard_error);
   result.score_before = alignment.score(guess, level);
   result.score_after = alignment.score(T, level);
+  if (stopped()) return;
   const Gain fit_gain = alignment.gain_over_nothing(T, level);
   const double best = std::max(1e-3, alignment.best_gain(level));
   result.fit = fit_gain.mean / best;
@@ -128,6 +132,7 @@ void examine(const Alignment& alignment, const Contest& contest, CalibrationResu
     const Gain lead = alignment.gain(T, *contest.rival, level);
     result.lead = lead.mean / std::max(1e-9, lead.standard_error);
   }
+  if (stopped()) return;
   result.resolution_deg = alignment.scenes().front().lidar.sigma_rad / kDegree;
   add_precision(alignment, contest, geometry::local(even, odd), result);
 }

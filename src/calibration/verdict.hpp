@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <stop_token>
 #include <string>
 
 #include "alignment.hpp"
@@ -14,6 +15,7 @@ struct Contest {
   std::optional<geometry::SE3> rival;  ///< The best of the other places that edges fit to.
   TranslationPrior prior;
   double reach_px = 1.5;  ///< Of the refinement that gave the result.
+  std::stop_token stop;   ///< Ends the examination with whatever numbers there are.
 };
 
 /// Covariance (right perturbation) of a pose from Alignment::refine: the sandwich of an
