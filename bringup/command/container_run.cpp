@@ -59,7 +59,7 @@ int run_container(CheckedConfig checked,
   container->start();
   guard.wait();
   log->info("stops");
-  const int code = final_state(container->components());
+  int code = final_state(container->components());
   const auto hung = container->stop(
       kStopTimeout, [&guard, save_timeout] { guard.extend(kStopPatience + save_timeout); });
   if (!hung.empty()) {
@@ -67,6 +67,7 @@ int run_container(CheckedConfig checked,
         "exits without {}, which hang{}", fmt::join(hung, ", "), hung.size() == 1 ? "s" : "");
     std::_Exit(Exit::kUnclean);  // their threads still use what destructors would take away
   }
+  if (!container->all_saved()) code = Exit::kUnclean;
   log->info("stopped");
   return code;
 }

@@ -110,6 +110,26 @@ void prepare_output(const RunOptions& options, const std::string& effective) {
   }
 }
 
+/// A calibration that nobody gave is that of the CamVox paper's rig: wrong for any other.
+void warn_of_default_calibration(const std::vector<ProbedComponent>& components, Logger& log) {
+  for (const std::string name : {"camera", "rig"}) {
+    bool used = false;
+    bool given = false;
+    for (const auto& component : components) {
+      for (const auto& [key, parameter] : component.effective_parameters) {
+        if (!key.starts_with(name + ".")) continue;
+        used = true;
+        given = given || parameter.location.to_string() != "default";
+      }
+    }
+    if (!used || given) continue;
+    log.warn(
+        "no calibration `{}` is given: takes that of the CamVox paper's rig; give your own with "
+        "--parameters rig.yaml, or under `parameters:` in the config",
+        name);
+  }
+}
+
 int run(const RunOptions& options) {
   const auto plugins = std::make_shared<PluginLoader>();
   auto checked = check_config(options, *plugins);
@@ -126,8 +146,9 @@ int run(const RunOptions& options) {
   if (!options.output.empty()) prepare_output(options, text);
   fmt::print("# effective config\n{}", text);
   std::fflush(stdout);
-  const auto least = parse_log_level(checked.config.container.log_level);
-  return run_container(std::move(checked), plugins, console_loggers(least));
+  const auto loggers = console_loggers(parse_log_level(checked.config.container.log_level));
+  warn_of_default_calibration(checked.probed.components, *loggers(checked.config.container.name));
+  return run_container(std::move(checked), plugins, loggers);
 }
 
 }  // namespace
@@ -168,7 +189,8 @@ void add_run(CLI::App& app, Action& action) {
   command->footer(
       "Exit code: 0 stopped by Ctrl-C, SIGTERM or the end of --bag, 1 could not start, 2 wrong "
       "command line,\n"
-      "3 a component had failed or hung, 130 killed by a second Ctrl-C.");
+      "3 a component had failed or hung, or could not save its results, 130 killed by a second "
+      "Ctrl-C.");
   command->callback([options, &action] { action = [options] { return run(*options); }; });
 }
 

@@ -161,11 +161,13 @@ bool ComponentSlot::halt(Clock::time_point deadline) {
   return false;
 }
 
-void ComponentSlot::finish() {
+bool ComponentSlot::finish() {
+  bool saved = true;
   if (component_ != nullptr && started_ != nullptr && *started_) {
     try {
       component_->stop();
     } catch (...) {
+      saved = false;
       log_->error("while stopping: {}", describe(std::current_exception()));
     }
   }
@@ -174,6 +176,7 @@ void ComponentSlot::finish() {
   context_.reset();
   factory_.reset();
   state_ = ComponentState::kStopped;
+  return saved;
 }
 
 void ComponentSlot::abandon() {

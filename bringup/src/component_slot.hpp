@@ -45,8 +45,8 @@ class ComponentSlot {
   /// Ends delivery. False: a callback of it does not return; everything that it might still touch
   /// is kept until the process ends.
   bool halt(Clock::time_point deadline);
-  /// After halt: lets the component save its results, and takes it down.
-  void finish();
+  /// After halt: lets the component save its results, and takes it down. False: it could not save.
+  bool finish();
   /// Both.
   bool end(Clock::time_point deadline) {
     if (!halt(deadline)) return false;

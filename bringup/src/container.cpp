@@ -91,6 +91,7 @@ struct Container::Implementation {
   std::vector<std::unique_ptr<ComponentSlot>> slots;
   std::uint64_t last_id = 0;
   bool running = false;
+  bool all_saved = true;
   std::shared_ptr<dds::Executor> control_executor;
   std::unique_ptr<dds::ComponentContext> control;  // the container as a component of itself
   std::unique_ptr<DiagnosticsPublisher> diagnostics;
@@ -186,7 +187,7 @@ std::vector<std::string> Container::Implementation::end_components(
   for (const auto& slot : slots) {  // a hung one does not keep the others from saving
     if (std::find(hung.begin(), hung.end(), slot->config().name) != hung.end()) continue;
     doing("saving results of component '" + slot->config().name + "'");
-    slot->finish();
+    all_saved = slot->finish() && all_saved;
   }
   return hung;
 }
@@ -307,6 +308,8 @@ std::vector<ComponentInfo> Container::components() const {
   for (const auto& slot : implementation_->slots) all.push_back(slot->info());
   return all;
 }
+
+bool Container::all_saved() const { return implementation_->all_saved; }
 
 std::string Container::current_activity() const {
   const std::lock_guard lock(implementation_->activity_mutex);

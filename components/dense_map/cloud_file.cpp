@@ -19,9 +19,10 @@ pcl::PointCloud<pcl::PointXYZRGB> to_pcl(const std::vector<dense::ColouredPoint>
   return cloud;
 }
 
-/// `write` gets a temporary name with the same extension.
+/// `write` gets a temporary name with the same extension. What is shorter than `min_bytes` is not
+/// whole.
 template <typename Write>
-std::string save(const std::filesystem::path& file, Write&& write) {
+std::string save(const std::filesystem::path& file, std::uintmax_t min_bytes, Write&& write) {
   auto temporary = file;
   temporary.replace_filename("." + file.filename().string() + ".part" + file.extension().string());
   bool written = false;
@@ -32,6 +33,11 @@ std::string save(const std::filesystem::path& file, Write&& write) {
     why = std::string(": ") + error.what();
   }
   std::error_code error;
+  // PCL does not notice a full disk when it writes PLY.
+  if (written && std::filesystem::file_size(temporary, error) < min_bytes) {
+    written = false;
+    why = ": the file is cut short; is the disk full?";
+  }
   if (written) std::filesystem::rename(temporary, file, error);
   if (written && !error) return {};
   std::filesystem::remove(temporary, error);
@@ -42,20 +48,21 @@ std::string save(const std::filesystem::path& file, Write&& write) {
 
 std::string save_pcd(const std::filesystem::path& file,
                      const std::vector<dense::ColouredPoint>& points) {
-  return save(file, [&](const std::string& name) {
+  return save(file, 1, [&](const std::string& name) {
     return pcl::io::savePCDFileBinaryCompressed(name, to_pcl(points)) == 0;
   });
 }
 
 std::string save_ply(const std::filesystem::path& file,
                      const std::vector<dense::ColouredPoint>& points) {
-  return save(file, [&](const std::string& name) {
+  constexpr std::uintmax_t kPointBytes = 15;  // x y z as float, three colours
+  return save(file, kPointBytes * points.size(), [&](const std::string& name) {
     return pcl::io::savePLYFileBinary(name, to_pcl(points)) == 0;
   });
 }
 
 std::string save_png(const std::filesystem::path& file, const dense::Picture& picture) {
-  return save(file, [&](const std::string& name) {
+  return save(file, 1, [&](const std::string& name) {
     const cv::Mat rgb(picture.height_px,
                       picture.width_px,
                       CV_8UC3,

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <filesystem>
+#include <stdexcept>
 
 #include "camvox/conversion/header.hpp"
 #include "camvox/conversion/image.hpp"
@@ -145,13 +146,17 @@ void DenseMapComponent::stop() {
   if (config_.output_dir.empty() || map_.size() == 0) return;
   const std::filesystem::path folder = config_.output_dir;
   const auto points = map_.points();
+  int not_saved = 0;
   const auto picture = dense::draw_top_view(points, map_.keyframe_positions());
   for (const auto& problem : {dense_map::save_pcd(folder / "dense_map.pcd", points),
                               dense_map::save_ply(folder / "dense_map.ply", points),
                               dense_map::save_png(folder / "dense_map.png", picture)}) {
-    if (!problem.empty()) context_.log().error("{}", problem);
+    if (problem.empty()) continue;
+    context_.log().error("{}", problem);
+    ++not_saved;
   }
   context_.log().info("dense map: {} points", points.size());
+  if (not_saved > 0) throw std::runtime_error("not all of the dense map was saved");
 }
 
 }  // namespace camvox

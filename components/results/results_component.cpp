@@ -3,10 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <stdexcept>
+#include <system_error>
 
 #include "camvox/conversion/pose.hpp"
 #include "camvox/trajectory/trajectory_file.hpp"
@@ -19,6 +21,7 @@ using camvox_interfaces::msg::Keyframe;
 using camvox_interfaces::msg::MapUpdate;
 using camvox_interfaces::msg::Progress;
 
+constexpr int kFiles = 5;
 constexpr std::array kStates = {"waiting", "ok", "lost", "relocalising", "localisation_only"};
 
 /// Every message counts here, however late this component is.
@@ -68,6 +71,8 @@ ResultsComponent::ResultsComponent(Context& context)
   const SubscribeOptions keyframes{.qos = qos::kKeyframes, .required = false};
   context.subscribe<Keyframe>({"keyframe", topics::kKeyframe}, add_keyframe, keyframes);
   context.subscribe<Keyframe>({"map_keyframe", topics::kMapKeyframe}, add_keyframe, keyframes);
+  context.subscribe<Keyframe>(
+      {"resent_keyframe", topics::kResentKeyframe}, add_keyframe, keyframes);
   context.subscribe<MapUpdate>({"map_update", topics::kMapUpdate},
                                [this](const auto& update) { add_update(*update); },
                                {.qos = qos::kKeyframes, .required = false});
@@ -117,30 +122,38 @@ void ResultsComponent::add_update(const MapUpdate& update) {
 
 void ResultsComponent::stop() {
   if (config_.output_dir.empty()) return;
-  save_trajectory("trajectory.tum", path_.frames());
-  save_trajectory("odometry.tum", odometry_);
-  save_trajectory("keyframes.tum", path_.keyframes());
-  save_text("frames.csv", frames_csv_);
-  save_text("timing.csv", timing_csv(times_s_));
+  const int saved = save_trajectory("trajectory.tum", path_.frames()) +
+                    save_trajectory("odometry.tum", odometry_) +
+                    save_trajectory("keyframes.tum", path_.keyframes()) +
+                    save_text("frames.csv", frames_csv_) +
+                    save_text("timing.csv", timing_csv(times_s_));
   context_.log().info("{} of {} frames tracked; results in {}",
                       odometry_.size(),
                       std::count(frames_csv_.begin(), frames_csv_.end(), '\n') - 1,
                       config_.output_dir);
+  if (saved < kFiles) {
+    throw std::runtime_error(
+        fmt::format("{} of {} result files were not saved", kFiles - saved, kFiles));
+  }
 }
 
-void ResultsComponent::save_trajectory(const char* name, trajectory::Trajectory of_camera) {
+bool ResultsComponent::save_trajectory(const char* name, trajectory::Trajectory of_camera) {
   for (auto& pose : of_camera) pose.T_world_body = pose.T_world_body * T_camera_body_;
   const auto status =
       trajectory::write_tum(std::filesystem::path(config_.output_dir) / name, of_camera);
   if (!status.ok()) context_.log().error("{}", status.message());
+  return status.ok();
 }
 
-void ResultsComponent::save_text(const char* name, const std::string& text) {
+bool ResultsComponent::save_text(const char* name, const std::string& text) {
   const auto file = std::filesystem::path(config_.output_dir) / name;
   std::ofstream stream(file, std::ios::trunc);
-  if (!(stream << text << std::flush)) {
-    context_.log().error("{}: cannot be written", file.string());
+  const bool saved = static_cast<bool>(stream << text << std::flush);
+  if (!saved) {
+    context_.log().error(
+        "{}: cannot be written: {}", file.string(), std::generic_category().message(errno));
   }
+  return saved;
 }
 
 }  // namespace camvox

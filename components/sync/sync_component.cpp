@@ -1,6 +1,7 @@
 #include "camvox/sync_component/sync_component.hpp"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 
@@ -19,6 +20,8 @@ using sync_component::stamp_of;
 constexpr Qos kImageReader{16, false, false};
 constexpr Qos kLidarReader{256, false, false};
 constexpr Qos kImuReader{2000, false, false};
+
+constexpr int kLooksBeforeMissing = 5;  // one a second
 
 double seconds(std::int64_t time_ns) { return 1e-9 * static_cast<double>(time_ns); }
 
@@ -49,10 +52,40 @@ SyncComponent::SyncComponent(Context& context)
   context.every(std::chrono::milliseconds(20), [this] { publish_ready(); });
   context.every(std::chrono::seconds(1), [this] {
     report_.write(context_.diagnostics(), assembler_, force_unit_.implausible());
+    tell_missing_inputs(false);
     if (!has_lidar()) {
       report_.write_stream(context_.diagnostics(), "depth", depth_pairing_.counters());
     }
   });
+}
+
+/// Says once which inputs nothing has come on: in a recording they may just not be there.
+void SyncComponent::tell_missing_inputs(bool at_end) {
+  struct Input {
+    const char* name;
+    std::string_view topic;
+    bool used;
+    std::uint64_t received;
+  };
+  const auto& imu = assembler_.imu().counters();
+  const std::array inputs = {
+      Input{"image", topics::kImage, true, assembler_.image_counters().received},
+      Input{"lidar", topics::kLidar, has_lidar(), assembler_.lidar().counters().received},
+      Input{"imu", topics::kImu, has_lidar() && config_.sync.use_imu, imu.received},
+      Input{"depth", topics::kRegisteredDepth, !has_lidar(), depth_pairing_.counters().received}};
+  const auto came = [](const Input& input) { return input.used && input.received > 0; };
+  const bool any = std::any_of(inputs.begin(), inputs.end(), came);
+  if (missing_told_ || (!any && !at_end)) return;
+  if (!at_end && ++looks_ < kLooksBeforeMissing) return;
+  missing_told_ = true;
+  for (const auto& input : inputs) {
+    if (!input.used || input.received > 0) continue;
+    context_.log().warn(
+        "nothing came on input '{}' (topic {}{} unless remapped)",
+        input.name,
+        input.topic,
+        input.topic == topics::kImage ? " or " + std::string(topics::kCompressedImage) : "");
+  }
 }
 
 void SyncComponent::subscribe_camera() {

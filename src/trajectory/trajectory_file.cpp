@@ -3,12 +3,14 @@
 #include <fmt/format.h>
 
 #include <cctype>
+#include <cerrno>
 #include <charconv>
 #include <fstream>
 #include <optional>
 #include <sstream>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <vector>
 
 namespace camvox::trajectory {
@@ -101,12 +103,14 @@ Status write_whole(const std::filesystem::path& file, const std::string& text) {
   temporary += ".part";
   std::ofstream stream(temporary, std::ios::trunc);
   const bool written = static_cast<bool>(stream << text << std::flush);
-  stream.close();
   std::error_code error;
+  if (!written) error.assign(errno, std::generic_category());
+  stream.close();
   if (written) std::filesystem::rename(temporary, file, error);
-  if (written && !error) return {};
+  if (!error) return {};
+  const std::string why = error.message();
   std::filesystem::remove(temporary, error);
-  return {StatusCode::kIo, fmt::format("{}: cannot be written", file.string())};
+  return {StatusCode::kIo, fmt::format("{}: cannot be written: {}", file.string(), why)};
 }
 
 }  // namespace

@@ -130,11 +130,68 @@ TEST_F(EndToEnd, AMapThatIsBrokenEndsTheRun) {
   EXPECT_THAT(result.output, HasSubstr("broken.mcap: the map cannot be loaded: not an MCAP file"));
 }
 
-TEST_F(EndToEnd, WithoutLidarNothingIsTrackedAndNothingBreaks) {
-  const auto result = run_all(
-      folder_ / "blind", {"--set", "replay.topics=[/camera/image_raw/compressed, /livox/imu]"});
+/// What can be computed without a topic is, and the log names the topic.
+TEST_F(EndToEnd, ATopicThatTheRecordingLacksIsNamed) {
+  struct Case {
+    const char* name;
+    const char* topics;
+    const char* missing;
+    const char* tracked;
+  };
+  for (const Case& one : {Case{"no_lidar",
+                               "/camera/image_raw/compressed, /livox/imu",
+                               "'lidar' (topic /livox/lidar ",
+                               "[results]: 0 of 50 frames"},
+                          Case{"no_image",
+                               "/livox/lidar, /livox/imu",
+                               "'image' (topic /camera/image_raw or /camera/image_raw/compressed ",
+                               "[results]: 0 of 0 frames"},
+                          Case{"no_imu",
+                               "/camera/image_raw/compressed, /livox/lidar",
+                               "'imu' (topic /livox/imu ",
+                               "[results]: 49 of 50 frames"}}) {
+    const auto result =
+        run_all(folder_ / one.name, {"--set", "replay.topics=[" + std::string(one.topics) + "]"});
+    EXPECT_EQ(result.exit_code, 0) << result.output;
+    EXPECT_THAT(result.output, HasSubstr("nothing came on input " + std::string(one.missing)));
+    EXPECT_THAT(result.output, HasSubstr(one.tracked)) << one.name;
+    EXPECT_TRUE(fs::exists(folder_ / one.name / "frames.csv"));
+  }
+}
+
+TEST_F(EndToEnd, ACalibrationThatIsNotGivenIsSaid) {
+  const auto output = folder_ / "default_rig";
+  const std::vector<std::string> words = {
+      "run", "replay.yaml", "--bag", recording(), "--lockstep", "--out", output};
+  const auto result = command(words);
   EXPECT_EQ(result.exit_code, 0) << result.output;
-  EXPECT_THAT(result.output, HasSubstr("0 of "));
+  EXPECT_THAT(result.output, HasSubstr("no calibration `camera` is given"));
+  EXPECT_THAT(result.output, HasSubstr("no calibration `rig` is given"));
+  const auto given = run_all(folder_ / "given_rig", {"--set", "replay.duration_s=0.5"});
+  EXPECT_THAT(given.output, ::testing::Not(HasSubstr("no calibration")));
+}
+
+/// The disk holds the config and little more.
+TEST_F(EndToEnd, AFullDiskIsSaidAndGivesAnExitCode) {
+  const auto disk = folder_ / "disk";
+  fs::create_directory(disk);
+  const std::string script =
+      "mount -t tmpfs -o size=256k none " + disk.string() +
+      " && " CAMVOX_COMMAND " run replay.yaml --bag " + recording().string() + " --parameters " +
+      (recording() / "rig.yaml").string() + " --lockstep --out " + (disk / "out").string() +
+      "; echo exit code $?; ls -A " + (disk / "out").string() + "; echo end of list";
+  test::ChildProcess child({"unshare", "--user", "--map-root-user", "--mount", "sh", "-c", script},
+                           {{"ROS_DOMAIN_ID", std::to_string(test::own_domain())}});
+  EXPECT_EQ(child.wait(std::chrono::seconds(120)), 0);
+  const auto output = child.output();
+  if (output.find("unshare:") != std::string::npos || output.find("mount:") != std::string::npos) {
+    GTEST_SKIP() << "no private mounts here: " << output;
+  }
+  EXPECT_THAT(output, HasSubstr("trajectory.tum: cannot be written: No space left on device"));
+  EXPECT_THAT(output, HasSubstr("dense_map.ply: cannot be written"));
+  EXPECT_THAT(output, HasSubstr("[results]: while stopping: 5 of 5 result files were not saved"));
+  EXPECT_THAT(output, HasSubstr("exit code 3\n"));
+  EXPECT_THAT(output, ::testing::Not(HasSubstr("dense_map.ply\n"))) << "a file that is cut short";
 }
 
 TEST_F(EndToEnd, WhatWasComputedIsSavedOnCtrlC) {

@@ -175,7 +175,7 @@ TEST_F(DenseMapTest, AFolderThatIsGoneIsAnErrorForEachFile) {
   send_images(1);
   send_keyframe(1, 1);
   std::filesystem::remove_all(folder_);
-  component.stop();
+  EXPECT_THROW(component.stop(), std::runtime_error);
   ASSERT_EQ(fake_.log_entries().size(), 4U);
   EXPECT_THAT(fake_.log_entries()[0].text, HasSubstr("dense_map.pcd: cannot be written"));
 }

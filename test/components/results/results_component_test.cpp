@@ -127,7 +127,7 @@ TEST_F(ResultsTest, TimingIsTheStatisticsOfWhatComponentsReported) {
 TEST_F(ResultsTest, AFolderThatIsGoneIsAnErrorInTheLog) {
   ResultsComponent results(fake_);
   std::filesystem::remove_all(folder_);
-  results.stop();
+  EXPECT_THROW(results.stop(), std::runtime_error);
   ASSERT_FALSE(fake_.log_entries().empty());
   EXPECT_THAT(fake_.log_entries()[0].text, HasSubstr("trajectory.tum: cannot be written"));
 }

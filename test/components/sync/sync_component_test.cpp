@@ -65,6 +65,18 @@ double time_ms(const Scan& scan, std::size_t i) {
   return static_cast<double>(scan.points()[i][0]) - 1000.0;
 }
 
+TEST_F(SyncTest, NamesTheInputThatNothingCameOn) {
+  make();
+  image_at(100);
+  scan_at(0);
+  for (int second = 0; second < 4; ++second) fake_.advance(std::chrono::seconds(1));
+  EXPECT_TRUE(fake_.log_entries().empty()) << "a driver may start late";
+  fake_.advance(std::chrono::seconds(1));
+  component_->stop();
+  ASSERT_EQ(fake_.log_entries().size(), 1U);
+  EXPECT_THAT(fake_.log_entries()[0].text, HasSubstr("input 'imu' (topic /livox/imu "));
+}
+
 TEST_F(SyncTest, PairsAnImageWithTheReturnsBeforeIt) {
   make();
   imu_between(0, 300);

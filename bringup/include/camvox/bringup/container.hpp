@@ -65,6 +65,9 @@ class Container {
   std::vector<std::string> stop(std::chrono::milliseconds timeout = std::chrono::milliseconds(1500),
                                 const std::function<void()>& before_saving = {});
 
+  /// After stop: whether every component could save its results.
+  [[nodiscard]] bool all_saved() const;
+
   /// What to do when a component has finished its work (Context::request_exit); before start.
   /// Called on a component's thread, so it must not call stop itself.
   void on_exit_request(std::function<void()> callback);

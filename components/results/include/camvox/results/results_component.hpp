@@ -35,13 +35,14 @@ struct ResultsConfig {
 class ResultsComponent final : public Component {
  public:
   explicit ResultsComponent(Context& context);
+  /// Throws std::runtime_error when not all could be saved.
   void stop() override;
 
  private:
   void add_pose(const camvox_interfaces::msg::FramePose& pose);
   void add_update(const camvox_interfaces::msg::MapUpdate& update);
-  void save_trajectory(const char* name, trajectory::Trajectory of_camera);
-  void save_text(const char* name, const std::string& text);
+  [[nodiscard]] bool save_trajectory(const char* name, trajectory::Trajectory of_camera);
+  [[nodiscard]] bool save_text(const char* name, const std::string& text);
 
   Context& context_;
   ResultsConfig config_;

@@ -28,6 +28,7 @@ namespace camvox {
 class SyncComponent final : public Component {
  public:
   explicit SyncComponent(Context& context);
+  void stop() override { tell_missing_inputs(true); }
 
  private:
   using FrameImage = camvox_interfaces::msg::FrameImage;
@@ -43,6 +44,7 @@ class SyncComponent final : public Component {
   template <typename Message, typename Read>
   void on_lidar(const Message& message, Read read);
 
+  void tell_missing_inputs(bool at_end);
   void publish_ready();
   void publish(const sync::Frame& frame);
   void fill(Scan& scan, const sync::Frame& frame, const FrameImage& image);
@@ -67,6 +69,8 @@ class SyncComponent final : public Component {
   std::deque<Loan<FrameImage>> images_;  // of the pending frames
   std::uint64_t next_frame_id_ = 1;
   std::optional<std::int64_t> previous_image_ns_;
+  int looks_ = 0;  ///< For missing inputs, since the first message.
+  bool missing_told_ = false;
 };
 
 }  // namespace camvox
