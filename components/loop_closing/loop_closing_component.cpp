@@ -45,6 +45,12 @@ LoopClosingComponent::LoopClosingComponent(Context& context)
   context.subscribe<Keyframe>({"keyframe", topics::kKeyframe},
                               [this](const auto& keyframe) { on_keyframe(*keyframe); },
                               {.qos = qos::kKeyframes});
+  context.subscribe<Keyframe>({"resent_keyframe", topics::kResentKeyframe},
+                              [this](const auto& keyframe) {
+                                resent_.insert(keyframe->id());
+                                on_keyframe(*keyframe);
+                              },
+                              {.qos = qos::kKeyframes, .required = false});
   context.subscribe<Keyframe>({"map_keyframe", topics::kMapKeyframe},
                               [this](const auto& keyframe) { on_map_keyframe(*keyframe); },
                               {.qos = qos::kKeyframes, .required = false});
@@ -102,7 +108,9 @@ void LoopClosingComponent::advance() {
 }
 
 void LoopClosingComponent::look_for_loops(const Header& header, tracking::KeyframeId id) {
-  const bool busy = worker_ && worker_->busy() >= static_cast<std::size_t>(config_.max_waiting);
+  const bool must = resent_.erase(id) > 0;  // a loop may have been closed there before
+  const bool busy =
+      !must && worker_ && worker_->busy() >= static_cast<std::size_t>(config_.max_waiting);
   left_out_ += busy ? 1 : 0;
   auto task = std::make_shared<loop::VerificationTask>();
   if (config_.enabled && !busy) *task = closer_.detect(id);

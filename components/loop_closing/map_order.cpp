@@ -8,6 +8,7 @@ namespace camvox::loop_closing {
 
 void MapOrder::add(tracking::Keyframe keyframe) {
   const auto id = keyframe.id;
+  if (known_.contains(id)) return;  // it came twice, or was given up
   keyframes_.insert_or_assign(id, std::move(keyframe));
 }
 

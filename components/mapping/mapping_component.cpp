@@ -18,7 +18,12 @@ namespace msg = camvox_interfaces::msg;
 
 /// Frames that wait for a keyframe which was announced and did not come; then they are answered
 /// without it.
-constexpr std::size_t kMaxWaiting = 64;
+constexpr std::size_t kMaxWaiting = 5;
+constexpr std::size_t kMaxWaitingLockstep = 64;
+/// After so many frames without a keyframe, missing ones are given up.
+constexpr std::size_t kMaxFramesBehind = 64;
+/// So many keyframes that come late are more than a lost message.
+constexpr std::size_t kManyKeyframes = 3;
 constexpr std::size_t kAnswersKept = 64;
 
 }  // namespace
@@ -37,6 +42,9 @@ MappingComponent::MappingComponent(Context& context)
   context.subscribe<Keyframe>({"keyframe", topics::kKeyframe},
                               [this](const auto& keyframe) { on_keyframe(*keyframe); },
                               {.qos = qos::kKeyframes});
+  context.subscribe<Keyframe>({"resent_keyframe", topics::kResentKeyframe},
+                              [this](const auto& keyframe) { on_resent_keyframe(*keyframe); },
+                              {.qos = qos::kKeyframes, .required = false});
   context.subscribe<FramePose>({"frame_pose", topics::kFramePose},
                                [this](const auto& pose) { on_pose(*pose); },
                                {.qos = {1024, true, false}});
@@ -48,7 +56,7 @@ MappingComponent::MappingComponent(Context& context)
   context.on_parameter_change<MappingComponentConfig>(config_,
                                                       [this](const MappingComponentConfig& next) {
                                                         config_.save_map = next.save_map;
-                                                        if (next.save_map) save();
+                                                        if (next.save_map) (void)save();
                                                       },
                                                       {"save_map"});
   context.every(std::chrono::milliseconds(500), [this] { announce(); });
@@ -72,7 +80,7 @@ void MappingComponent::start() {
 
 void MappingComponent::stop() {
   runner_.reset();
-  if (config_.save_map) save();
+  if (config_.save_map && !save()) throw std::runtime_error("the map was not saved");
 }
 
 void MappingComponent::load() {
@@ -94,18 +102,22 @@ void MappingComponent::load() {
   announcer_.begin(mapper_, updates_);
 }
 
-void MappingComponent::save() {
+bool MappingComponent::save() {
   const auto& map = mapper_.map();
   const bool changed = !config_.localisation_only && !map.keyframes().empty();
-  if (config_.output_dir.empty() || !changed) return;
+  if (config_.output_dir.empty() || !changed) return true;
   const auto path = std::filesystem::path(config_.output_dir) / "map.mcap";
   const auto status = mapping::save_map(path, map, mapper_.epoch(), mapper_.model().camera());
-  if (!status.ok()) return context_.log().error("{}", status.message());
+  if (!status.ok()) {
+    context_.log().error("{}", status.message());
+    return false;
+  }
   context_.log().info("map of {} keyframes, {} landmarks ({:.1f} MB) saved to {}",
                       map.keyframes().size(),
                       map.landmark_count(),
                       1e-6 * static_cast<double>(map.memory_bytes()),
                       path.string());
+  return true;
 }
 
 /// Until tracking has sent a pose it may not be there yet, or not hear what is said.
@@ -117,14 +129,25 @@ void MappingComponent::announce() {
 
 void MappingComponent::on_keyframe(const Keyframe& message) {
   const auto work = progress_.measure();
-  auto keyframe = conversion::read_keyframe(message);
-  const auto id = keyframe.id;
-  keyframes_.insert_or_assign(id, std::move(keyframe));
+  if (message.id() <= newest_keyframe_) return;
+  keyframes_.insert_or_assign(message.id(), conversion::read_keyframe(message));
+  answer_ready();
+}
+
+/// What is sent again comes in order, and where it has a gap, there is no more.
+void MappingComponent::on_resent_keyframe(const Keyframe& message) {
+  const auto work = progress_.measure();
+  if (message.id() <= newest_keyframe_) return;
+  insert(conversion::read_keyframe(message));
+  publish_update(message.header());
   answer_ready();
 }
 
 void MappingComponent::on_pose(const FramePose& pose) {
   const auto work = progress_.measure();
+  // After a restart: a map of an earlier epoch would not be taken.
+  const bool is_new = mapper_.map().keyframes().empty();
+  if (is_new && pose.map_epoch() > mapper_.epoch()) mapper_.restore({}, pose.map_epoch());
   waiting_.push_back({pose.header(), pose.reference_keyframe_id()});
   answer_ready();
 }
@@ -169,27 +192,56 @@ void MappingComponent::on_correction(const LoopCorrection& correction) {
 
 /// Whether the keyframe that the pose refers to is in the map, or has come, or never will.
 bool MappingComponent::is_ready(const Waiting& frame) const {
-  const auto id = frame.reference_id;
-  return id <= newest_keyframe_ || keyframes_.contains(id) || waiting_.size() > kMaxWaiting;
+  const auto patience = config_.lockstep ? kMaxWaitingLockstep : kMaxWaiting;
+  return frame.reference_id <= newest_keyframe_ || waiting_.size() > patience;
+}
+
+/// Takes in the keyframes that have come, in order, as far as the frame knows them.
+void MappingComponent::insert_up_to(const Waiting& frame) {
+  while (!keyframes_.empty() && keyframes_.begin()->first <= frame.reference_id) {
+    const bool in_order = keyframes_.begin()->first == newest_keyframe_ + 1;
+    if (!in_order && frames_behind_ <= kMaxFramesBehind) return;
+    insert(keyframes_.extract(keyframes_.begin()).mapped());
+    // Loop closing looks at the keyframe as the map has it now.
+    if (config_.lockstep) publish_update(frame.header);
+  }
+}
+
+/// Notes whether keyframes are missing. When many have come late, what was told meanwhile may be
+/// lost as well: all of the map is told again, and adjusted as a whole.
+void MappingComponent::follow(const Waiting& frame) {
+  const bool was_behind = std::exchange(behind_, frame.reference_id > newest_keyframe_);
+  if (behind_) {
+    ++frames_behind_;
+    if (!was_behind && frame.reference_id >= newest_keyframe_ + kManyKeyframes) {
+      context_.log().warn(
+          "keyframes {} to {} are missing", newest_keyframe_ + 1, frame.reference_id);
+    }
+    return;
+  }
+  const auto late = std::exchange(inserted_behind_, 0);
+  if (late < kManyKeyframes) return;
+  context_.log().info("no keyframe is missing any more: {} in the map, the newest is {}",
+                      mapper_.map().keyframes().size(),
+                      newest_keyframe_);
+  full_due_ = config_.mapping.full_bundle_iterations > 0;
+  mapping_component::publish_changes(
+      mapper_.all_changes(), mapper_.epoch(), frame.header, updates_);
 }
 
 void MappingComponent::answer_ready() {
   // In lockstep nothing depends on how far the announcement has come.
   if (config_.lockstep && !announcer_.done()) return;
-  while (!waiting_.empty() && is_ready(waiting_.front())) {
+  while (!waiting_.empty()) {
     const Waiting frame = waiting_.front();
-    const auto keyframe = keyframes_.find(frame.reference_id);
-    if (keyframe != keyframes_.end()) {
-      insert(keyframe->second);
-      keyframes_.erase(keyframes_.begin(), std::next(keyframe));
-      // Loop closing looks at the keyframe as the map has it now.
-      if (config_.lockstep) publish_update(frame.header);
-    }
+    insert_up_to(frame);
+    if (!is_ready(frame)) return;
     const bool loop_open = config_.lockstep && config_.wait_for_loop_closing &&
                            frame.header.frame_id() == newest_keyframe_frame_ &&
                            !loop_answers_.contains(newest_keyframe_frame_);
     if (loop_open) return;
     waiting_.pop_front();
+    follow(frame);
     answer(frame);
   }
 }
@@ -203,6 +255,9 @@ std::string MappingComponent::problem_with(const tracking::Keyframe& keyframe) c
 
 void MappingComponent::insert(const tracking::Keyframe& keyframe) {
   newest_keyframe_ = std::max(newest_keyframe_, keyframe.id);
+  frames_behind_ = 0;
+  if (behind_) ++inserted_behind_;
+  keyframes_.erase(keyframes_.begin(), keyframes_.upper_bound(keyframe.id));
   auto problem = problem_with(keyframe);
   if (problem.empty()) {
     mapper_.set_reference(keyframe.id);
@@ -268,11 +323,14 @@ void MappingComponent::publish_local_map(const Waiting& frame) {
   const auto map = mapper_.local_map(frame.header.frame_id(), frame.reference_id);
   const auto left_out = conversion::write_local_map(map, *message);
   message->header() = frame.header;
+  message->next_keyframe_id(std::max(map.next_keyframe_id, newest_keyframe_ + 1));
   local_maps_.publish(std::move(message));
   if (left_out > 0) context_.diagnostics().set("left out of the local map", left_out);
 }
 
-void MappingComponent::publish_update(const Header& header) {
+/// `header`: of the frame that the map has come to.
+void MappingComponent::publish_update(Header header) {
+  if (behind_) header.frame_id(std::min(header.frame_id(), newest_keyframe_frame_));
   mapping_component::publish_changes(mapper_.take_changes(), mapper_.epoch(), header, updates_);
 }
 

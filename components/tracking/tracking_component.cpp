@@ -37,12 +37,15 @@ TrackingComponent::TrackingComponent(Context& context)
       builder_(config_.frame, config_.camera),
       tracker_(tracker_config(config_), builder_.tracking_camera(), rig_.T_body_camera),
       queue_(config_.use_imu, config_.lockstep),
+      store_(static_cast<std::size_t>(config_.keyframes_kept)),
       odometry_(context, rig_.T_body_camera),
       progress_(context),
       poses_(context.advertise<msg::FramePose>({"frame_pose", topics::kFramePose},
                                                {.qos = qos::kKeyframes})),
       keyframes_(context.advertise<msg::Keyframe>({"keyframe", topics::kKeyframe},
                                                   {.qos = qos::kKeyframes})),
+      resent_keyframes_(context.advertise<msg::Keyframe>(
+          {"resent_keyframe", topics::kResentKeyframe}, {.qos = qos::kKeyframes})),
       requests_(context.advertise<msg::Keyframe>(
           {"relocalisation_request", topics::kRelocalisationRequest})) {
   constexpr int kHeld = static_cast<int>(tracking_component::FrameQueue::kCapacity) + 1;
@@ -78,8 +81,17 @@ void TrackingComponent::on_map(const LocalMap& map) {
   if (map.header().frame_id() >= map_frame_id_) {  // one that was overtaken says nothing new
     map_frame_id_ = map.header().frame_id();
     tracker_.update_map(conversion::read_local_map(map));
+    send_again(map);
   }
   process_ready();
+}
+
+void TrackingComponent::send_again(const LocalMap& map) {
+  const auto missing =
+      store_.missing(map.next_keyframe_id(), map.header().frame_id(), last_frame_id_);
+  for (const auto* keyframe : missing) publish_keyframe(*keyframe, resent_keyframes_);
+  keyframes_sent_again_ += missing.size();
+  context_.diagnostics().set("keyframes sent again", keyframes_sent_again_);
 }
 
 void TrackingComponent::on_answer(const Answer& answer) {
@@ -168,6 +180,7 @@ void TrackingComponent::publish(tracking::FrameResult& result, double time_s) {
   pose->processing_time_s(static_cast<float>(time_s));
   poses_.publish(std::move(pose));
   if (result.has_pose()) odometry_.publish(result);
+  if (result.keyframe) store_.add(*std::move(result.keyframe));
 }
 
 void TrackingComponent::publish_keyframe(const tracking::Keyframe& keyframe,

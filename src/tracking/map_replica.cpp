@@ -6,7 +6,8 @@
 namespace camvox::tracking {
 
 bool MapReplica::apply(LocalMap map) {
-  const bool older = map.map_epoch < map_epoch_ || map.frame_id < frame_id_;
+  const bool older = map.map_epoch < map_epoch_ || map.frame_id < frame_id_ ||
+                     map.next_keyframe_id < next_pending_id_;
   if (map.keyframes.empty() || older) return false;
 
   std::vector<std::uint8_t> strikes(map.landmarks.size(), 0);
@@ -22,8 +23,9 @@ bool MapReplica::apply(LocalMap map) {
   map_epoch_ = map.map_epoch;
   frame_id_ = map.frame_id;
   next_keyframe_id_ = std::max(next_keyframe_id_, map.next_keyframe_id);
+  next_pending_id_ = map.next_keyframe_id;
 
-  std::erase_if(pending_, [&](const Pending& own) { return own.frame_id <= map.frame_id; });
+  std::erase_if(pending_, [&](const Pending& own) { return own.keyframe.id < next_pending_id_; });
   for (auto& own : pending_) {
     move_with_parent(own);
     append(own);
@@ -52,7 +54,6 @@ void MapReplica::append(const Pending& pending) {
 void MapReplica::add(const Keyframe& keyframe) {
   Pending own;
   own.keyframe = {keyframe.id, keyframe.T_map_camera};
-  own.frame_id = keyframe.frame_id;
   own.parent_id = keyframe.parent_id;
   own.T_parent_camera = keyframe.T_parent_camera;
   for (std::size_t i = 0; i < keyframe.landmark_ids.size(); ++i) {

@@ -1,15 +1,21 @@
 #!/usr/bin/python3
-"""Runs a recording with front end and back end in two containers: two processes, or two hosts.
+"""Runs a recording with front end and back end in two containers, in two processes and on two
+hosts, with faults of the back end and of the link, and compares with one container. By hand it
+prints a table for a whole recording:
+
+    split_run.py RECORDING [--camvox FILE] [--work DIR] [--at S] [--cut S] [--only NAME...]
 
 Two network namespaces joined by a veth pair stand for two hosts; each has a /dev/shm of its own.
 That needs no root where the kernel allows user namespaces.
 """
+import argparse
 import csv
 import json
 import pathlib
 import shutil
 import signal
 import subprocess
+import time
 
 FRONT_IP, BACK_IP = "10.60.0.1", "10.60.0.2"
 HOSTS_SCRIPT = f"""
@@ -20,6 +26,9 @@ sleep 0.2
 ip link add veth0 type veth peer name veth1 netns $back || exit 1
 ip addr add {FRONT_IP}/24 dev veth0 && ip link set veth0 up || exit 1
 nsenter -t $back -n sh -c 'ip addr add {BACK_IP}/24 dev veth1; ip link set veth1 up' || exit 1
+# A participant sees only the interfaces that run when it starts.
+until ip link show veth0 | grep -q "state UP" &&
+      nsenter -t $back -n ip link show veth1 | grep -q "state UP"; do sleep 0.1; done
 echo ready $back
 trap "kill $back" EXIT
 read end
@@ -133,12 +142,42 @@ class Runs:
         return json.loads(file.read_text())
 
 
+    # Faults, for `split(meanwhile=...)`: each returns the back end that runs afterwards.
+
+    def kill_back_end(self, name, after_s, hosts=None):
+        """kill -9 after some time, and a new back end one second later."""
+        hosts = hosts or OneHost()
+
+        def fault(back):
+            time.sleep(after_s)
+            back.kill()
+            back.wait()
+            time.sleep(1.0)
+            return self.start("back_end.yaml", self.work / name / "back", hosts.options, hosts.back)
+
+        return fault
+
+    @staticmethod
+    def cut_link(hosts, after_s, for_s):
+        def fault(back):
+            time.sleep(after_s)
+            hosts.set_link("down")
+            time.sleep(for_s)
+            hosts.set_link("up")
+            return back
+
+        return fault
+
+
 def finish(process, output, timeout_s=600):
     """Waits for the end; raises RuntimeError with the log if it is not a good one."""
     code = process.wait(timeout=timeout_s)
     if code != 0:
-        log = pathlib.Path(str(output) + ".log").read_text(errors="replace")
-        raise RuntimeError(f"{output}: exit code {code}\n{log[-3000:]}")
+        raise RuntimeError(f"{output}: exit code {code}\n{log_of(output)[-3000:]}")
+
+
+def log_of(output):
+    return pathlib.Path(str(output) + ".log").read_text(errors="replace")
 
 
 def states(output):
@@ -148,3 +187,57 @@ def states(output):
         for row in csv.DictReader(file):
             counts[row["state"]] = counts.get(row["state"], 0) + 1
     return counts
+
+
+def stamps(file):
+    """The stamps of a TUM file as they are written."""
+    lines = pathlib.Path(file).read_text().splitlines()
+    return [line.split()[0] for line in lines if line and not line.startswith("#")]
+
+
+def print_row(runs, name, one, front, back):
+    difference = runs.compare(one / "trajectory.tum", front / "trajectory.tum")
+    ape = runs.compare(runs.recording / "truth_body.tum", front / "trajectory.tum", "se3")
+    counts = states(front)
+    missing = set(stamps(front / "keyframes.tum")) - set(stamps(back / "keyframes.tum"))
+    print(f"| {name} | {counts.pop('ok', 0)} of {sum(states(front).values())} "
+          f"| {1000.0 * difference['ape_m']['max']:.1f} | {ape['ape_m']['rmse']:.4f} "
+          f"| {len(stamps(back / 'keyframes.tum'))} | {len(missing)} |", flush=True)
+
+
+def main():
+    parser = argparse.ArgumentParser(description="see the top of this file")
+    parser.add_argument("recording")
+    parser.add_argument("--camvox", default="camvox")
+    parser.add_argument("--work", default="output/split_run")
+    parser.add_argument("--at", type=float, default=25.0, help="when the fault comes, s")
+    parser.add_argument("--cut", type=float, default=10.0, help="how long the link is cut, s")
+    parser.add_argument("--only", nargs="*")
+    options = parser.parse_args()
+    runs = Runs(options.recording, options.work, options.camvox)
+    print("| run | frames tracked | max difference to one container (mm) | APE rmse (m) "
+          "| keyframes of the back end | lacking there |\n" + "| --- " * 6 + "|")
+
+    def row(name, one, *arguments, **more):
+        if options.only and name not in options.only:
+            return
+        front, back = runs.split(name, *arguments, **more)
+        print_row(runs, name, one, front, back)
+
+    lockstep = ["--lockstep"]
+    one = runs.one("one", lockstep)
+    print_row(runs, "one", one, one, one)
+    row("processes", one, lockstep)
+    row("processes_live", one, [])
+    row("killed", one, [], meanwhile=runs.kill_back_end("killed", options.at))
+    hosts = TwoHosts()
+    try:
+        row("hosts", one, lockstep, hosts)
+        row("hosts_live", one, [], hosts)
+        row("cut", one, [], hosts, meanwhile=runs.cut_link(hosts, options.at, options.cut))
+    finally:
+        hosts.close()
+
+
+if __name__ == "__main__":
+    main()

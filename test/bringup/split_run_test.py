@@ -9,7 +9,7 @@ import tempfile
 import unittest
 
 sys.path.insert(0, str(pathlib.Path(__file__).parent))
-from split_run import Runs, TwoHosts, states  # noqa: E402
+from split_run import Runs, TwoHosts, stamps, states  # noqa: E402
 
 CAMVOX = sys.argv.pop(1)
 
@@ -19,7 +19,7 @@ class SplitRun(unittest.TestCase):
     def setUpClass(cls):
         cls._folder = tempfile.TemporaryDirectory(prefix="split_run_")
         work = pathlib.Path(cls._folder.name)
-        subprocess.run([CAMVOX, "simulate", "demo", "--set", "duration_s=4.0", "-o",
+        subprocess.run([CAMVOX, "simulate", "demo", "--set", "duration_s=8.0", "-o",
                         str(work / "recording")], check=True, stdout=subprocess.DEVNULL)
         cls.runs = Runs(work / "recording", work, CAMVOX)
 
@@ -40,6 +40,25 @@ class SplitRun(unittest.TestCase):
             self.expect_same(one, self.runs.split("processes", ["--lockstep"]))
         with self.subTest("two hosts"):
             self.expect_same(one, self.runs.split("hosts", ["--lockstep"], self.two_hosts()))
+
+    def expect_whole(self, front, back):
+        """Each frame was tracked, and the back end has what the front end made."""
+        counts = states(front)
+        # The first frame starts the map; the last one may lack the end of its scan.
+        self.assertGreaterEqual(counts.get("ok", 0) + 1, sum(counts.values()), counts)
+        made = set(stamps(front / "keyframes.tum"))
+        self.assertGreater(len(made), 2)
+        self.assertFalse(made - set(stamps(back / "keyframes.tum")), "keyframes are lacking")
+        same = self.runs.compare(front / "keyframes.tum", back / "keyframes.tum")
+        self.assertLess(same["ape_m"]["max"], 0.01)
+
+    # The robot stands still for 3 s. Slower than real: time for the back end to come back.
+    SLOW = ["--set", "replay.start_offset_s=2.5", "--set", "replay.rate=0.3"]
+
+    def test_tracking_goes_on_without_the_back_end_and_the_map_is_whole_again(self):
+        fault = self.runs.kill_back_end("killed", 12.0)
+        front, back = self.runs.split("killed", [], front_more=self.SLOW, meanwhile=fault)
+        self.expect_whole(front, back)
 
     def two_hosts(self):
         try:

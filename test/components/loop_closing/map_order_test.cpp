@@ -71,6 +71,16 @@ TEST(MapOrderTest, DoesNotWaitForWhatWasLost) {
   EXPECT_FALSE(order.next());
 }
 
+TEST(MapOrderTest, KeyframesThatComeTwiceChangeNothing) {
+  MapOrder order(2);
+  for (std::uint64_t id = 1; id <= 4; ++id) order.add(keyframe(id));
+  order.add(change({1, 2, 3, 4}), 5);
+  EXPECT_TRUE(order.next());
+  for (std::uint64_t id = 1; id <= 4; ++id) order.add(keyframe(id));
+  EXPECT_FALSE(order.next());
+  EXPECT_EQ(order.waiting(), 0U);
+}
+
 TEST(MapOrderTest, KnowsTheKeyframesOfALoadedMap) {
   MapOrder order(8);
   order.add(change({5}), 0);

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <random>
@@ -65,13 +66,14 @@ class MappingTest : public testing::Test {
     return result;
   }
 
-  void send_keyframe(std::uint64_t id, double x_m) {
-    fake_.send<Keyframe>("keyframe", [&](Keyframe& message) {
+  void send_keyframe(std::uint64_t id, double x_m, const char* port = "keyframe") {
+    fake_.send<Keyframe>(port, [&](Keyframe& message) {
       ASSERT_TRUE(conversion::write_keyframe(keyframe(id, x_m), message));
     });
   }
-  void send_pose(std::uint64_t frame_id, std::uint64_t reference_id) {
+  void send_pose(std::uint64_t frame_id, std::uint64_t reference_id, std::uint64_t epoch = 0) {
     FramePose pose;
+    pose.map_epoch(epoch);
     pose.header().frame_id(frame_id);
     pose.reference_keyframe_id(reference_id);
     fake_.send("frame_pose", pose);
@@ -204,6 +206,57 @@ TEST_F(MappingTest, LiveTheAdjustedMapComesFromAThread) {
   EXPECT_GE(fake_.run_posted(std::chrono::seconds(20)), 1U);
   EXPECT_GT(maps().size(), at_once);
   EXPECT_THAT(fake_.diagnostics().status().values["local bundle adjustment"], HasSubstr("cost"));
+  mapping.stop();
+}
+
+TEST_F(MappingTest, AfterLostKeyframesTheNextOnesWaitUntilTheyAreSentAgain) {
+  MappingComponent mapping(fake_);
+  mapping.start();
+  send_keyframe(1, 0.0);
+  send_pose(1, 1);
+  send_keyframe(5, 1.2);
+  for (std::uint64_t frame = 5; frame < 12; ++frame) send_pose(frame, 5);
+  EXPECT_EQ(mapping.mapper().map().keyframes().size(), 1U);
+  ASSERT_GE(maps().size(), 2U) << "frames are answered all the same";
+  EXPECT_EQ(maps().back()->next_keyframe_id(), 2U) << "which tells what is missing";
+  for (const std::uint64_t id : {2U, 3U, 4U}) {
+    send_keyframe(id, 0.3 * static_cast<double>(id - 1), "resent_keyframe");
+  }
+  send_pose(12, 5);
+  EXPECT_EQ(maps().back()->next_keyframe_id(), 6U);
+  EXPECT_EQ(mapping.mapper().map().keyframes().size(), 5U);
+  const auto updates = fake_.published<MapUpdate>("map_update");
+  const auto whole = std::any_of(updates.begin(), updates.end(), [](const auto& update) {
+    return update->keyframe_ids_count() == 5;
+  });
+  EXPECT_TRUE(whole) << "those who were cut off get all of the map";
+  mapping.stop();
+}
+
+TEST_F(MappingTest, ARestartedMappingTakesOverTheEpochAndAsksForTheFirstKeyframe) {
+  MappingComponent mapping(fake_);
+  mapping.start();
+  for (std::uint64_t frame = 100; frame < 110; ++frame) send_pose(frame, 50, 3);
+  ASSERT_FALSE(maps().empty());
+  EXPECT_EQ(maps().back()->next_keyframe_id(), 1U);
+  EXPECT_EQ(maps().back()->map_epoch(), 3U);
+  // The oldest that tracking still has.
+  send_keyframe(48, 0.0, "resent_keyframe");
+  send_keyframe(49, 0.3, "resent_keyframe");
+  send_keyframe(50, 0.6, "resent_keyframe");
+  EXPECT_EQ(maps().back()->next_keyframe_id(), 51U);
+  mapping.stop();
+}
+
+TEST_F(MappingTest, AKeyframeThatIsNeverSentAgainIsGivenUp) {
+  MappingComponent mapping(fake_);
+  mapping.start();
+  send_keyframe(1, 0.0);
+  send_pose(1, 1);
+  send_keyframe(3, 0.6);
+  for (std::uint64_t frame = 3; frame < 80; ++frame) send_pose(frame, 3);
+  EXPECT_EQ(mapping.mapper().map().keyframes().size(), 2U);
+  EXPECT_EQ(maps().back()->next_keyframe_id(), 4U);
   mapping.stop();
 }
 

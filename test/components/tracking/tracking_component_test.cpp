@@ -90,9 +90,11 @@ class TrackingComponentTest : public testing::Test {
     send_depth(frame_id);
   }
   /// What mapping answers: nothing new, so tracking keeps its own keyframes.
-  void send_local_map(std::uint64_t frame_id) {
-    fake_.send<msg::LocalMap>("local_map",
-                              [&](msg::LocalMap& map) { fill_header(map.header(), frame_id); });
+  void send_local_map(std::uint64_t frame_id, std::uint64_t next_keyframe_id = 1000) {
+    fake_.send<msg::LocalMap>("local_map", [&](msg::LocalMap& map) {
+      fill_header(map.header(), frame_id);
+      map.next_keyframe_id(next_keyframe_id);
+    });
   }
   [[nodiscard]] auto poses() { return fake_.published<msg::FramePose>("frame_pose"); }
   /// Of the body in the map, in the body's axes of the start: y is to the left.
@@ -180,6 +182,20 @@ TEST_F(TrackingComponentTest, LiveTheNewestFrameCounts) {
   EXPECT_EQ(poses().back()->header().frame_id(), 3U);
   send_depth(2);  // too late
   EXPECT_EQ(poses().back()->header().frame_id(), 3U);
+}
+
+TEST_F(TrackingComponentTest, WhatMappingLacksIsSentAgain) {
+  start();
+  send(1, 0);
+  send_local_map(1, 2);
+  EXPECT_TRUE(fake_.published<msg::Keyframe>("resent_keyframe").empty());
+  send(2, 4);
+  send_local_map(2, 1);  // of a mapping that was restarted
+  const auto resent = fake_.published<msg::Keyframe>("resent_keyframe");
+  ASSERT_EQ(resent.size(), 1U);
+  EXPECT_EQ(resent[0]->id(), 1U);
+  EXPECT_EQ(resent[0]->features_count(),
+            fake_.published<msg::Keyframe>("keyframe")[0]->features_count());
 }
 
 TEST_F(TrackingComponentTest, WithImuAFrameWaitsForItsCloud) {

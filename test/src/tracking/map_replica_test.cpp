@@ -74,8 +74,13 @@ TEST_F(MapReplicaTest, NewLandmarksAreThereAtOnceAndStayUntilMappingHasThem) {
   ASSERT_TRUE(replica_.apply(local_map(11, 0, {5, 77})));
   EXPECT_TRUE(replica_.find(landmark_id(2, 0)));
   EXPECT_TRUE(replica_.T_map_keyframe(2));
-  // Now it has seen the keyframe, and dropped what it founded.
+  // It has seen the keyframe's frame, but the keyframe was lost on the way.
   ASSERT_TRUE(replica_.apply(local_map(12, 0, {5, 77})));
+  EXPECT_TRUE(replica_.find(landmark_id(2, 0)));
+  // Now it has the keyframe, and dropped what it founded.
+  LocalMap with_keyframe = local_map(13, 0, {5, 77});
+  with_keyframe.next_keyframe_id = 3;
+  ASSERT_TRUE(replica_.apply(with_keyframe));
   EXPECT_FALSE(replica_.find(landmark_id(2, 0)));
   EXPECT_EQ(replica_.pending_count(), 0U);
 }
@@ -99,6 +104,16 @@ TEST_F(MapReplicaTest, OlderMapsAreIgnored) {
   EXPECT_FALSE(replica_.apply(local_map(9, 1, {6})));
   EXPECT_FALSE(replica_.apply(local_map(11, 0, {6})));
   EXPECT_TRUE(replica_.find(5));
+}
+
+TEST_F(MapReplicaTest, AMapThatWasRestartedIsIgnoredUntilItHasCaughtUp) {
+  LocalMap whole = local_map(10, 0, {5});
+  whole.next_keyframe_id = 7;
+  ASSERT_TRUE(replica_.apply(whole));
+  EXPECT_FALSE(replica_.apply(local_map(11, 0, {6})));
+  EXPECT_TRUE(replica_.find(5));
+  whole.frame_id = 12;
+  EXPECT_TRUE(replica_.apply(whole));
 }
 
 TEST_F(MapReplicaTest, BansWhatDisagreesAndRemembersItFromMapToMap) {

@@ -4,6 +4,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <set>
 
 #include "camvox/component/component.hpp"
 #include "camvox/component/progress.hpp"
@@ -77,8 +78,9 @@ class LoopClosingComponent final : public Component {
   Publisher<LoopCorrection> corrections_;
   Publisher<RelocalisationAnswer> answers_;
   std::unique_ptr<loop_closing::Worker> worker_;
-  std::uint64_t left_out_ = 0;  ///< Keyframes that the worker had no time for.
-  std::uint64_t outdated_ = 0;  ///< Corrections that the map had moved on from.
+  std::set<tracking::KeyframeId> resent_;  ///< Sent again, and not yet looked at.
+  std::uint64_t left_out_ = 0;             ///< Keyframes that the worker had no time for.
+  std::uint64_t outdated_ = 0;             ///< Corrections that the map had moved on from.
   std::uint64_t requests_ = 0;
   std::uint64_t relocalised_ = 0;
 };

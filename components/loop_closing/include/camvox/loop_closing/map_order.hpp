@@ -30,6 +30,7 @@ class MapOrder {
   /// was lost).
   explicit MapOrder(std::size_t patience) : patience_(patience) {}
 
+  /// One that is in the map already changes nothing.
   void add(tracking::Keyframe keyframe);
   /// `frame_id`: the frame that the map has come to.
   void add(loop::MapChange change, std::uint64_t frame_id);

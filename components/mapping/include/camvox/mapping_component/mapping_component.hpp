@@ -56,6 +56,10 @@ struct MappingComponentConfig {
 /// A loaded map is announced to loop closing first, so that tracking (which has the parameter
 /// `load_map`, too) finds its place in it; keyframes that are not tied to it are refused, so that
 /// there is never a second map beside it. A map that cannot be loaded ends the run.
+///
+/// Keyframes come in without a gap. When some were lost (the link was cut) or all (this process was
+/// restarted), frames are answered with the map as it is; it says which keyframe is the next, and
+/// tracking sends what is missing once more, in order.
 class MappingComponent final : public Component {
  public:
   explicit MappingComponent(Context& context);
@@ -77,13 +81,16 @@ class MappingComponent final : public Component {
   };
 
   void on_keyframe(const Keyframe& message);
+  void on_resent_keyframe(const Keyframe& message);
   void on_pose(const FramePose& pose);
   void on_correction(const LoopCorrection& correction);
   void answer_ready();
+  void insert_up_to(const Waiting& frame);
   [[nodiscard]] bool is_ready(const Waiting& frame) const;
+  void follow(const Waiting& frame);
   void answer(const Waiting& frame);
   void load();
-  void save();
+  [[nodiscard]] bool save();
   void announce();
   [[nodiscard]] std::string problem_with(const tracking::Keyframe& keyframe) const;
   void insert(const tracking::Keyframe& keyframe);
@@ -93,7 +100,7 @@ class MappingComponent final : public Component {
               double time_s);
   void start_next_job();
   void publish_local_map(const Waiting& frame);
-  void publish_update(const Header& header);
+  void publish_update(Header header);
   void report();
   void report_memory();
 
@@ -110,8 +117,11 @@ class MappingComponent final : public Component {
   Waiting last_;      ///< The frame answered last.
   std::uint64_t newest_keyframe_ = 0;
   std::uint64_t newest_keyframe_frame_ = 0;
-  std::uint64_t job_due_ = 0;  ///< Keyframe whose surroundings are to be adjusted; 0: none.
-  bool full_due_ = false;      ///< The whole map is to be adjusted.
+  std::size_t frames_behind_ = 0;    ///< Answered without their keyframe since the last one came.
+  std::size_t inserted_behind_ = 0;  ///< Keyframes that came late, since behind_.
+  bool behind_ = false;              ///< Keyframes are missing.
+  std::uint64_t job_due_ = 0;        ///< Keyframe whose surroundings are to be adjusted; 0: none.
+  bool full_due_ = false;            ///< The whole map is to be adjusted.
   std::uint64_t refused_ = 0;
   mapping_component::MapAnnouncer announcer_;
   std::unique_ptr<mapping_component::JobRunner> runner_;

@@ -15,6 +15,7 @@
 #include "camvox/tracking/health.hpp"
 #include "camvox/tracking/tracker.hpp"
 #include "camvox/tracking_component/frame_queue.hpp"
+#include "camvox/tracking_component/keyframe_store.hpp"
 #include "camvox/tracking_component/odometry_output.hpp"
 #include "camvox/tracking_component/rotation_history.hpp"
 
@@ -28,6 +29,8 @@ struct TrackingComponentConfig {
   bool use_imu = true;       ///< Wait for the cloud of a frame too: it brings the gyro's rotation.
   std::string load_map;      ///< As mapping's: not "": find the place in that map first.
   bool localisation_only = false;  ///< Make no keyframes: the map stays as it is.
+  /// Of the keyframes sent, the newest that mapping gets again if it lost them (some 100 kB each).
+  int keyframes_kept = 300;
   tracking::TrackerConfig tracker;
   tracking::FrameBuilderConfig frame;
   sensors::CameraIntrinsics camera;
@@ -40,6 +43,7 @@ struct TrackingComponentConfig {
     field("use_imu", self.use_imu);
     field("load_map", self.load_map);
     field("localisation_only", self.localisation_only);
+    field("keyframes_kept", self.keyframes_kept, config::at_least(0));
     field("tracker", self.tracker);
     field("frame", self.frame);
     field("camera", self.camera);
@@ -51,7 +55,8 @@ struct TrackingComponentConfig {
 /// tracking::Tracker). The keyframe of a frame is published before its pose. Live, the newest
 /// complete frame counts and what it overtakes is dropped and counted; a frame whose depth does not
 /// come is tracked without when the next one is complete. In lockstep a frame also waits for the
-/// answer to the relocalisation request of the one before, if anybody listens to requests.
+/// answer to the relocalisation request of the one before, if anybody listens to requests. Tracking
+/// goes on without mapping; what mapping lacks when it is there (again), it gets sent again.
 class TrackingComponent final : public Component {
  public:
   explicit TrackingComponent(Context& context);
@@ -63,6 +68,7 @@ class TrackingComponent final : public Component {
 
   void on_map(const LocalMap& map);
   void on_answer(const Answer& answer);
+  void send_again(const LocalMap& map);
   void remember_rotation(const camvox_interfaces::msg::Cloud& cloud);
   void process_ready();
   [[nodiscard]] bool may_process() const;
@@ -82,15 +88,18 @@ class TrackingComponent final : public Component {
   tracking::HealthMonitor health_;
   tracking_component::FrameQueue queue_;
   tracking_component::RotationHistory rotations_;
+  tracking_component::KeyframeStore store_;
   tracking_component::OdometryOutput odometry_;
   ProgressReporter progress_;
   Publisher<camvox_interfaces::msg::FramePose> poses_;
   Publisher<camvox_interfaces::msg::Keyframe> keyframes_;
+  Publisher<camvox_interfaces::msg::Keyframe> resent_keyframes_;
   Publisher<camvox_interfaces::msg::Keyframe> requests_;
   std::uint64_t last_frame_id_ = 0;
   std::uint64_t map_frame_id_ = 0;    ///< Of the newest local map.
   std::uint64_t awaited_answer_ = 0;  ///< In lockstep: to the request of this frame; 0: none.
   std::uint64_t keyframes_sent_ = 0;
+  std::uint64_t keyframes_sent_again_ = 0;
 };
 
 }  // namespace camvox

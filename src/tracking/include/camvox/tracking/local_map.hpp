@@ -35,7 +35,7 @@ struct LocalMap {
   std::uint64_t frame_id = 0;  ///< The newest frame whose keyframe, if it made one, is included.
   std::uint64_t map_epoch = 0;
   KeyframeId reference_keyframe_id = 0;
-  KeyframeId next_keyframe_id = 0;      ///< No keyframe of the map has this id or a greater one.
+  KeyframeId next_keyframe_id = 0;      ///< Mapping has dealt with all keyframes below, no others.
   std::vector<KeyframePose> keyframes;  ///< With the reference; ids ascend.
   std::vector<Landmark> landmarks;      ///< Ids ascend.
 };

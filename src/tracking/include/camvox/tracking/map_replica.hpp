@@ -20,7 +20,8 @@ class MapReplica {
 
   /// Takes in a local map; own keyframes that it includes are dropped, later ones are moved
   /// along with the keyframe that they were taken from. Returns false, and changes nothing, for an
-  /// empty map and for one older than the present one.
+  /// empty map, for one older than the present one, and for one that knows fewer keyframes: mapping
+  /// was restarted and has not caught up.
   bool apply(LocalMap map);
   /// Adds a keyframe just made, and the landmarks that it founded.
   void add(const Keyframe& keyframe);
@@ -53,7 +54,6 @@ class MapReplica {
 
   struct Pending {
     LocalMap::KeyframePose keyframe;
-    std::uint64_t frame_id = 0;
     KeyframeId parent_id = 0;
     geometry::SE3 T_parent_camera;
     std::vector<Landmark> landmarks;
@@ -71,6 +71,7 @@ class MapReplica {
   std::uint64_t map_epoch_ = 0;
   std::uint64_t frame_id_ = 0;
   KeyframeId next_keyframe_id_ = 1;
+  KeyframeId next_pending_id_ = 0;  ///< Mapping has taken in all keyframes below.
 };
 
 }  // namespace camvox::tracking
