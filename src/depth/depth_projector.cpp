@@ -38,7 +38,8 @@ MixedCellRule make_rule(const DepthProjectorConfig& config) {
           static_cast<float>(config.near_margin_px),
           static_cast<float>(config.far_margin_px),
           static_cast<float>(config.surface_gap),
-          static_cast<float>(config.max_roughness)};
+          static_cast<float>(config.max_roughness),
+          static_cast<float>(1.0 / config.max_range_m)};
 }
 
 /// The pixels of a cell that lie in the image, and where.
@@ -95,10 +96,10 @@ void clear(const Block& block) {
   }
 }
 
-/// The plane stays well in front of the camera over the whole cell.
-bool is_usable(const CellPlane& plane) {
+/// The plane stays well in front of the camera, and within the largest depth, over the whole cell.
+bool is_usable(const CellPlane& plane, float least_rho) {
   const float change = 0.5F * kCell * (std::abs(plane.slope_u) + std::abs(plane.slope_v));
-  return plane.rho > 0.0F && change < 0.5F * plane.rho;
+  return plane.rho > 0.0F && change < 0.5F * plane.rho && plane.rho - change > least_rho;
 }
 
 }  // namespace
@@ -114,7 +115,8 @@ struct DepthProjector::Implementation {
         planes(camera) {}
 
   std::size_t write(std::span<float> depth_m, std::span<float> sigma_m) {
-    MixedCellFiller filler(make_rule(config), noise);
+    const MixedCellRule mixed = make_rule(config);
+    MixedCellFiller filler(mixed, noise);
     CellPixels pixels;
     std::size_t filled = 0;
     for (int row = kMargin; row < grid.rows() - kMargin; ++row) {
@@ -123,7 +125,8 @@ struct DepthProjector::Implementation {
       for (int column = kMargin; column < grid.columns() - kMargin; ++column) {
         const Block block = block_at(column - kMargin, row, depth_m, sigma_m);
         const std::size_t cell = grid.cell(column, row);
-        const bool plane = planes.kind(cell) == CellKind::kPlane && is_usable(planes.plane(cell));
+        const bool plane =
+            planes.kind(cell) == CellKind::kPlane && is_usable(planes.plane(cell), mixed.least_rho);
         if (!plane && !filler.fill(grid, planes, column, row, pixels)) {
           if (empty.width == 0)
             empty = block;

@@ -334,9 +334,13 @@ void MixedCellFiller::measure(const Returns& returns,
 /// Gives the pixels to `surface` that it is nearest to so far, its depth included if it may have
 /// one.
 CAMVOX_TARGET_CLONES
-void MixedCellFiller::merge(const Surface& surface, const Distances& distances, Nearest& nearest) {
+void MixedCellFiller::merge(const Surface& surface,
+                            float least_rho,
+                            const Distances& distances,
+                            Nearest& nearest) {
   const CellPlane plane = surface.plane;
   const float reach2 = surface.reach_px * std::abs(surface.reach_px);
+  least_rho = std::max(0.5F * plane.rho, least_rho);
   const std::array<float, 4> low = surface.low;
   const std::array<float, 4> high = surface.high;
   for (int v = 0; v < kCell; ++v) {
@@ -351,8 +355,7 @@ void MixedCellFiller::merge(const Surface& surface, const Distances& distances, 
                         static_cast<int>(du <= high[0]) & static_cast<int>(dv >= low[1]) &
                         static_cast<int>(dv <= high[1]) & static_cast<int>(du + dv >= low[2]) &
                         static_cast<int>(du + dv <= high[2]) & static_cast<int>(du - dv >= low[3]) &
-                        static_cast<int>(du - dv <= high[3]) &
-                        static_cast<int>(rho > 0.5F * plane.rho);
+                        static_cast<int>(du - dv <= high[3]) & static_cast<int>(rho > least_rho);
       const float best2 = nearest.best2[px];
       const float second2 = nearest.second2[px];
       const bool nearer = d2 < best2;
@@ -407,7 +410,7 @@ bool MixedCellFiller::fill(
   Distances distances;
   for (std::size_t s = 0; s < surface_count_; ++s) {
     measure(sorted_, surfaces_[s], distances);
-    merge(surfaces_[s], distances, nearest);
+    merge(surfaces_[s], rule_.least_rho, distances, nearest);
   }
   return decide(nearest, pixels);
 }

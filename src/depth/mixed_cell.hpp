@@ -16,6 +16,7 @@ struct MixedCellRule {
   float far_margin_px = 4.0F;
   float surface_gap = 0.03F;
   float max_roughness = 0.02F;
+  float least_rho = 0.0F;  ///< Inverse of the largest depth: a surface that goes on stops there.
 };
 
 /// Depth and sigma of a cell's pixels, row by row; 0: none.
@@ -89,7 +90,10 @@ class MixedCellFiller {
   Surface& add(std::size_t begin, std::size_t end, const CellPlane& plane, float reach_px);
   [[nodiscard]] bool find_octagon(Surface& surface) const;
   static void measure(const Returns& returns, const Surface& surface, Distances& distances);
-  static void merge(const Surface& surface, const Distances& distances, Nearest& nearest);
+  static void merge(const Surface& surface,
+                    float least_rho,
+                    const Distances& distances,
+                    Nearest& nearest);
   [[nodiscard]] bool decide(const Nearest& nearest, CellPixels& pixels) const;
   /// Of inverse depth: from the range, and from the direction, too.
   [[nodiscard]] float range_sigma(float rho) const;

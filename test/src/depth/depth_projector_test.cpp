@@ -146,6 +146,16 @@ TEST_F(DepthProjectorTest, SlantedPlaneGivesDepthAlongTheAxisEverywhere) {
   EXPECT_GT(filled, 0.97 * looked_at);
 }
 
+/// The ground runs to the horizon; returns end at the largest range, and so must the depth.
+TEST_F(DepthProjectorTest, GroundEndsAtTheLargestDepth) {
+  const auto points =
+      scan(24'000, 0.02, [](double, double y) { return y > 0.0 ? 1.5 / (y + 1e-4) : 1e4; });
+  project(points, {});
+  const float farthest_m = *std::max_element(images_.depth_m.begin(), images_.depth_m.end());
+  EXPECT_GT(farthest_m, 80.0F);
+  EXPECT_LE(farthest_m, 130.0F);
+}
+
 /// A wall at 4 m fills the left of the lidar's view, one at 12 m the rest. The camera is 0.2 m to
 /// the left of the lidar's place, then to the right: parallax moves the edge by 48 px more on the
 /// near wall, over returns of the far wall, or opens a gap that nobody saw.
