@@ -95,7 +95,7 @@ def evaluate(bag, out):
 
 def map_points(log):
     """The number of landmarks that mapping says it has saved."""
-    found = re.search(r"(\d+) landmarks saved", log)
+    found = re.search(r"map of \d+ keyframes, (\d+) landmarks", log)
     if not found:
         raise Failed("mapping did not say how many landmarks it saved")
     return int(found.group(1))
@@ -163,8 +163,8 @@ def timing(arguments, folder):
 
 
 def orb_ms(images):
-    """Median time of cv::ORB's detectAndCompute on one thread for one of extraction_bench's sets."""
-    bench = ROOT / "build/camvox_test/bench/features/extraction_bench"
+    """Median time of cv::ORB's detectAndCompute on one thread for one of bench_extraction's sets."""
+    bench = ROOT / "build/camvox_test/bench/features/bench_extraction"
     if not bench.is_file():
         raise Failed(f"{bench} is not built: bringup/build")
     done = subprocess.run([bench, "2"], capture_output=True, text=True, check=True)
@@ -223,7 +223,7 @@ def main():
     parser.add_argument("--config", default="replay.yaml", help="a file in config/")
     parser.add_argument("--runs", type=int, default=10, help="of repeat")
     parser.add_argument("--images", default="synthetic 1520x568",
-                        help="of yardstick: a line of extraction_bench")
+                        help="of yardstick: a line of bench_extraction")
     parser.add_argument("--domain", type=int, default=96, help="ROS_DOMAIN_ID of the runs")
     parser.add_argument("--keep", type=pathlib.Path, help="folder for what the runs leave")
     arguments = parser.parse_args()
