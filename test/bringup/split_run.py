@@ -93,7 +93,7 @@ class Runs:
     def __init__(self, recording, work, camvox="camvox"):
         self.recording = pathlib.Path(recording).resolve()
         self.work = pathlib.Path(work).resolve()
-        self.camvox = shutil.which(str(camvox)) or str(pathlib.Path(camvox).resolve())
+        self.camvox = str(pathlib.Path(shutil.which(str(camvox)) or camvox).resolve())
 
     def start(self, config, output, more, prefix=lambda command: command):
         """Starts `camvox run`; its log is beside its output folder."""

@@ -45,10 +45,11 @@ def report(output):
     with open(output / "latency.csv", newline="") as file:
         rows = [{key: int(value) for key, value in row.items()} for row in csv.DictReader(file)]
     with open(output / "frames.csv", newline="") as file:
-        tracked = sum(row["state"] == "ok" for row in csv.DictReader(file))
+        states = {int(row["stamp_ns"]): row["state"] for row in csv.DictReader(file)}
+    tracked = sum(state == "ok" for state in states.values())
     whole = [row for row in rows if row["odometry_ns"] and row["last_input_ns"]]
     # The end of the last image's scan is not in the recording any more.
-    dropped = [row for row in rows[:-1] if not row["odometry_ns"]]
+    dropped = [row for row in rows[:-1] if row["image_stamp_ns"] not in states]
     print(f"{len(rows)} images, {tracked} frames tracked, {len(dropped)} dropped "
           f"(the last image, whose scan is cut, does not count)\n")
     print("| ms | median | p95 | p99 | max |\n| --- | --- | --- | --- | --- |")
