@@ -25,7 +25,7 @@ import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 CAMVOX = ROOT / "install/camvox_bringup/bin/camvox"
-PRESETS = ("rotation", "standstill", "corridor", "demo", "loop_400m", "campus_1800m")
+PRESETS = ("rotation", "standstill", "corridor", "dropouts", "demo", "loop_400m", "campus_1800m")
 TRACKED = ("ok", "localisation_only")
 # The paper's Table on its i7-8550U: its name, milliseconds, our components that do the same.
 PAPER_TIMING = (
@@ -213,7 +213,7 @@ def repeat(arguments, folder):
 
 
 def main():
-    commands = {"close-depth": (close_depth, ["demo"]), "accuracy": (accuracy, list(PRESETS[:5])),
+    commands = {"close-depth": (close_depth, ["demo"]), "accuracy": (accuracy, list(PRESETS[:6])),
                 "timing": (timing, ["demo"]), "yardstick": (yardstick, ["loop_400m"]),
                 "repeat": (repeat, ["demo"])}
     parser = argparse.ArgumentParser(description=__doc__,
