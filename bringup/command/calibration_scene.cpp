@@ -6,8 +6,8 @@
 #include <cmath>
 #include <string_view>
 
+#include "bag_message.hpp"
 #include "camvox/interfaces/livox_ros_driver2.hpp"
-#include "camvox/interfaces/message_type.hpp"
 #include "camvox/interfaces/sensor_msgs.hpp"
 #include "camvox/storage/bag_reader.hpp"
 #include "camvox/sync/image_decoder.hpp"
@@ -39,16 +39,6 @@ const storage::BagTopic& choose(const storage::BagReader& bag,
   }
   throw CommandError(name.empty() ? fmt::format("the bag has no topic with {}", what)
                                   : fmt::format("the bag has no topic {} with {}", name, what));
-}
-
-template <typename Message>
-Message decode(const storage::BagMessage& raw, const std::string& topic) {
-  Message message;
-  if (!interfaces::message_type<Message>().read_cdr(
-          reinterpret_cast<const std::uint8_t*>(raw.data.data()), raw.data.size(), &message)) {
-    throw CommandError(fmt::format("{}: a message is malformed", topic));
-  }
-  return message;
 }
 
 cv::Mat read_image(const storage::BagMessage& raw,

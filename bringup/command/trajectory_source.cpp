@@ -6,8 +6,8 @@
 #include <array>
 #include <optional>
 
+#include "bag_message.hpp"
 #include "camvox/interfaces/geometry_msgs.hpp"
-#include "camvox/interfaces/message_type.hpp"
 #include "camvox/interfaces/nav_msgs.hpp"
 #include "camvox/interfaces/sensor_msgs.hpp"
 #include "camvox/storage/bag_reader.hpp"
@@ -50,16 +50,6 @@ const storage::BagTopic& choose_topic(const storage::BagReader& bag, const std::
     return topic->name.find("truth") != std::string::npos;
   });
   return truth != found.end() ? **truth : *found.front();
-}
-
-template <typename Message>
-Message decode(const storage::BagMessage& raw, const std::string& topic) {
-  Message message;
-  if (!interfaces::message_type<Message>().read_cdr(
-          reinterpret_cast<const std::uint8_t*>(raw.data.data()), raw.data.size(), &message)) {
-    throw CommandError(fmt::format("{}: a message is malformed", topic));
-  }
-  return message;
 }
 
 template <typename Header>
