@@ -91,7 +91,14 @@ void MapReplica::judge(std::size_t landmark, bool agreed) {
   if (agreed) {
     strikes = static_cast<std::uint8_t>(strikes > 0 ? strikes - 1 : 0);
   } else {
-    strikes = static_cast<std::uint8_t>(std::min(strikes + kStrike, int{kStrikesToBan}));
+    strikes = static_cast<std::uint8_t>(strikes + kStrike);
+    if (strikes >= kStrikesToBan) strikes = kStrikesToBan + kBanFrames - 1;
+  }
+}
+
+void MapReplica::age_bans() {
+  for (auto& strikes : strikes_) {
+    if (strikes >= kStrikesToBan) --strikes;
   }
 }
 

@@ -52,6 +52,9 @@ FrameResult Tracker::track(Frame frame) {
   result.frame_id = frame.frame_id;
   result.stamp_ns = frame.stamp_ns;
   result.statistics.features = static_cast<int>(frame.features.size());
+  // Where keyframes are made, new landmarks replace those that are banned, often for good reason.
+  // In a map that stays as it is, one by one all of them would be: each has its unlucky frames.
+  if (config_.localisation_only) map_.age_bans();
   FrameMatcher matcher(frame.features, map_, camera_, config_);
   for (std::size_t i = 0; i < frame.features.size(); ++i) {
     result.statistics.features_with_depth += matcher.usable_depth_m(i) > 0.0 ? 1 : 0;

@@ -131,5 +131,23 @@ TEST_F(MapReplicaTest, BansWhatDisagreesAndRemembersItFromMapToMap) {
   EXPECT_EQ(replica_.banned_count(), 1);
 }
 
+TEST_F(MapReplicaTest, ABanEndsWithTheFramesAndComesBackAtTheNextDisagreement) {
+  ASSERT_TRUE(replica_.apply(local_map(10, 0, {5, 6})));
+  const auto index = *replica_.find(6);
+  for (int i = 0; i < 3; ++i) replica_.judge(index, false);
+  for (int frame = 1; frame < 20; ++frame) replica_.age_bans();
+  EXPECT_TRUE(replica_.is_banned(index));
+  replica_.age_bans();
+  EXPECT_FALSE(replica_.is_banned(index));
+  replica_.age_bans();  // no more than the ban is forgotten
+  replica_.judge(index, false);
+  EXPECT_TRUE(replica_.is_banned(index));
+  for (int frame = 0; frame < 20; ++frame) replica_.age_bans();
+  replica_.judge(index, true);
+  replica_.judge(index, true);
+  replica_.judge(index, false);
+  EXPECT_FALSE(replica_.is_banned(index)) << "what agrees wins its place back";
+}
+
 }  // namespace
 }  // namespace camvox::tracking

@@ -40,6 +40,9 @@ class MapReplica {
     return strikes_[landmark] >= kStrikesToBan;
   }
   [[nodiscard]] int banned_count() const;
+  /// Another frame has gone by for those that are banned; after kBanFrames they may try again, and
+  /// are banned anew if they still disagree.
+  void age_bans();
 
   [[nodiscard]] std::uint64_t map_epoch() const { return map_epoch_; }
   [[nodiscard]] std::uint64_t frame_id() const { return frame_id_; }
@@ -51,6 +54,7 @@ class MapReplica {
  private:
   static constexpr std::uint8_t kStrikesToBan = 6;  ///< A disagreement is two, an agreement -1.
   static constexpr std::uint8_t kStrike = 2;
+  static constexpr std::uint8_t kBanFrames = 20;
 
   struct Pending {
     LocalMap::KeyframePose keyframe;
