@@ -151,12 +151,23 @@ void add_timing(const Report& report, ReportPage& page) {
   page.paragraph("Paper: CamVox's own figures on an i7-8550U; other machine, other data.");
 }
 
+/// Pictures go by name, but what came after goes right behind what was before.
+std::pair<std::string, bool> place_of(const fs::path& picture) {
+  constexpr std::string_view kAfter = "after";
+  auto name = picture.stem().string();
+  const bool after = name.ends_with(kAfter);
+  if (after) name.replace(name.size() - kAfter.size(), kAfter.size(), "before");
+  return {name, after};
+}
+
 void add_pictures(const Report& report, ReportPage& page) {
   std::vector<fs::path> pictures;
   for (const auto& entry : fs::directory_iterator(report.folder)) {
     if (entry.path().extension() == ".png") pictures.push_back(entry.path());
   }
-  std::sort(pictures.begin(), pictures.end());
+  std::sort(pictures.begin(), pictures.end(), [](const auto& a, const auto& b) {
+    return place_of(a) < place_of(b);
+  });
   if (!pictures.empty()) page.heading("Pictures");
   for (const auto& picture : pictures) {
     std::string caption = picture.stem();

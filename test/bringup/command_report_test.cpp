@@ -57,6 +57,19 @@ TEST_F(CommandReport, PageShowsEverythingAndNeedsNothingElse) {
   EXPECT_THAT(html, Not(HasSubstr("src=\"http")));
 }
 
+TEST_F(CommandReport, ShowsWhatWasBeforeFirst) {
+  for (const auto* name : {"calibration_after", "top_view", "calibration_before"}) {
+    put(std::string(name) + ".png", "\x89PNG");
+  }
+  EXPECT_EQ(command({"report", folder_}).exit_code, 0);
+  const auto html = page();
+  const auto at = [&html](const char* caption) { return html.find(caption); };
+  EXPECT_LT(at("calibration before"), at("calibration after"));
+  EXPECT_LT(at("calibration after"), at("depth overlay"));
+  EXPECT_LT(at("depth overlay"), at("top view"));
+  EXPECT_NE(at("top view"), std::string::npos);
+}
+
 TEST_F(CommandReport, WithoutAReferenceThereAreNoErrors) {
   EXPECT_EQ(command({"report", folder_}).exit_code, 0);
   EXPECT_THAT(page(), HasSubstr("No reference was given"));
