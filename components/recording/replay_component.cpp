@@ -1,5 +1,7 @@
 #include "camvox/recording/replay_component.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cstring>
@@ -16,6 +18,9 @@ namespace {
 
 constexpr std::int64_t kSecond_ns = 1'000'000'000;
 constexpr int kQueuedMessages = 4096;
+/// At the end, after so long without a frame done the last ones are given up. A loop that is closed
+/// last may take minutes on a busy machine.
+constexpr double kLongestSilence_s = 300.0;
 /// How often in a row topics must be found connected, as the other side may see it a little later.
 constexpr int kLooksConnected = 3;
 
@@ -110,7 +115,9 @@ ReplayComponent::ReplayComponent(Context& context)
       {"progress", topics::kProgress},
       [this](const Sample<camvox_interfaces::msg::Progress>& sample) {
         const auto& name = sample->component_name();
-        gate_.done({name.data(), strnlen(name.data(), name.size())}, sample->header().stamp_ns());
+        const auto& header = sample->header();
+        gate_.done(
+            {name.data(), strnlen(name.data(), name.size())}, header.stamp_ns(), header.frame_id());
         if (player_) player_->poke();
         last_activity_ns_ = context_.now_ns();
       },
@@ -231,9 +238,19 @@ void ReplayComponent::report() {
   context_.diagnostics().set("rate", state.rate);
   if (!state.finished) return;
   if (!end_reported_) return report_end(state);
-  const auto settle_ns = static_cast<std::int64_t>(config_.settle_s * 1e9);
-  if (config_.exit_at_end && context_.now_ns() - last_activity_ns_ >= settle_ns) {
-    context_.request_exit();
+  if (config_.exit_at_end) exit_when_done();
+}
+
+/// Time alone says little: a busy machine may take long for the last frames.
+void ReplayComponent::exit_when_done() {
+  const double silent_s = 1e-9 * static_cast<double>(context_.now_ns() - last_activity_ns_);
+  if (silent_s < config_.settle_s) return;
+  const auto behind = gate_.behind();
+  if (!behind.empty() && silent_s < kLongestSilence_s) return;
+  context_.request_exit();
+  if (!behind.empty()) {
+    throw std::runtime_error(
+        fmt::format("the last frames never got through {}", fmt::join(behind, ", ")));
   }
 }
 

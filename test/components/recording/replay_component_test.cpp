@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <fstream>
+#include <optional>
 #include <thread>
 
 #include "bag_files.hpp"
@@ -99,6 +100,60 @@ TEST(ReplayComponent, AsksForTheExitOnceNothingIsReportedDoneAnyMore) {
   EXPECT_FALSE(fake.exit_requested()) << "somebody was still at work";
   fake.advance(std::chrono::milliseconds(400));
   EXPECT_TRUE(fake.exit_requested());
+}
+
+/// Two frames in lockstep, which sync and tracking report.
+class ReplayToTheEnd : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    recording::write_bag(folder_.file("bag"), {{"/image", 0.0, 0}, {"/image", 0.1, 2}});
+    fake_.set_parameter("bag", folder_.file("bag"));
+    fake_.set_parameter("lockstep", true);
+    fake_.set_parameter("lockstep_topic", std::string("/image"));
+    fake_.set_parameter("lockstep_components", std::vector<std::string>{"sync", "tracking"});
+    fake_.set_parameter("exit_at_end", true);
+    fake_.set_parameter("settle_s", 0.2);
+    replay_.emplace(fake_);
+    replay_->start();
+    ASSERT_TRUE(run_until(fake_, [&] { return logged(fake_, "2 messages sent"); }));
+  }
+  void report(std::string_view component, std::uint64_t frame_id) {
+    fake_.send<Progress>("progress", [&](Progress& progress) {
+      progress.header().stamp_ns() = kStart_ns + static_cast<std::int64_t>(frame_id);
+      progress.header().frame_id() = frame_id;
+      component.copy(progress.component_name().data(), progress.component_name().size() - 1);
+    });
+  }
+
+  const TemporaryFolder folder_;
+  FakeContext fake_;
+  std::optional<ReplayComponent> replay_;
+};
+
+/// A busy machine may take longer for the last frame than any time that one would wait.
+TEST_F(ReplayToTheEnd, WaitsForTheLastFrameThatWasHandedOn) {
+  report("sync", 1);
+  report("tracking", 1);
+  report("sync", 2);
+  fake_.advance(std::chrono::seconds(100));
+  EXPECT_FALSE(fake_.exit_requested());
+  report("tracking", 2);
+  fake_.advance(std::chrono::milliseconds(400));
+  EXPECT_TRUE(fake_.exit_requested());
+}
+
+TEST_F(ReplayToTheEnd, DoesNotWaitForAFrameThatIsNeverWhole) {
+  report("sync", 1);
+  report("tracking", 1);
+  fake_.advance(std::chrono::milliseconds(400));
+  EXPECT_TRUE(fake_.exit_requested());
+}
+
+TEST_F(ReplayToTheEnd, GivesUpWhatNeverComesAndNamesWhoHasIt) {
+  report("sync", 1);
+  EXPECT_THAT([&] { fake_.advance(std::chrono::seconds(310)); },
+              ::testing::ThrowsMessage<std::runtime_error>(::testing::HasSubstr("tracking")));
+  EXPECT_TRUE(fake_.exit_requested());
 }
 
 TEST(ReplayComponent, PublishesTheClockOfTheRecording) {

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <limits>
 #include <map>
 #include <mutex>
 #include <string>
@@ -20,13 +21,22 @@ class LockstepGate {
 
   /// True if the next image may be sent.
   [[nodiscard]] bool may_send() const;
+  /// Components that have not finished the newest frame that another one has. Images that the first
+  /// of them holds, as their scan has not come, do not count: at the end none comes any more.
+  [[nodiscard]] std::vector<std::string> behind() const;
   void sent(std::int64_t stamp_ns);
-  /// `component` has finished all frames up to the stamp. Components not waited for are ignored.
-  void done(const std::string& component, std::int64_t stamp_ns);
+  /// `component` has finished all frames up to the stamp and this one; 0: an image of that stamp
+  /// made no frame. Components not waited for are ignored.
+  void done(const std::string& component, std::int64_t stamp_ns, std::uint64_t frame_id);
 
  private:
+  struct Done {
+    std::int64_t stamp_ns = std::numeric_limits<std::int64_t>::min();
+    std::uint64_t frame_id = 0;
+  };
+
   mutable std::mutex mutex_;
-  std::map<std::string, std::int64_t> done_;
+  std::map<std::string, Done> done_;
   std::deque<std::int64_t> in_flight_;
   std::size_t frames_in_flight_;
 };

@@ -35,8 +35,9 @@ struct ReplayConfig {
   /// Starts when each of these topics has a publisher and a subscriber, one of them in another
   /// process: a back end that is not there yet would miss the first frames.
   std::vector<std::string> wait_for_topics;
-  bool exit_at_end = false;  ///< Ends the container when the recording is over.
-  double settle_s = 2.0;     ///< How long nothing must be reported done before that.
+  /// Ends the container when the recording is over, and in lockstep the last frame is done.
+  bool exit_at_end = false;
+  double settle_s = 2.0;  ///< How long nothing must be reported done before that.
 
   template <typename Self, typename Visitor>
   static void visit(Self& self, Visitor&& field) {
@@ -86,6 +87,7 @@ class ReplayComponent final : public Component {
   void play_when_connected();
   void report();
   void report_end(const recording::PlayerState& state);
+  void exit_when_done();
 
   Context& context_;
   ReplayConfig config_;
