@@ -25,6 +25,7 @@ struct RecordOptions {
   double max_bag_duration = 0.0;  // s
   std::int64_t max_cache_size = std::int64_t{256} << 20;
   std::int64_t polling_interval_ms = 100;
+  std::string qos_overrides;
 };
 
 std::string default_output() {
@@ -46,6 +47,7 @@ config::ParameterMap to_parameters(const RecordOptions& options) {
   set("max_bag_duration_s", options.max_bag_duration);
   set("max_cache_mb", std::max<std::int64_t>(1, options.max_cache_size >> 20));
   set("polling_interval_s", 1e-3 * static_cast<double>(options.polling_interval_ms));
+  set("qos_overrides", options.qos_overrides);
   return parameters;
 }
 
@@ -106,6 +108,11 @@ void add_bag_record(CLI::App& bag, const CommonOptions& common, Action& action) 
       ->add_option(
           "-p,--polling-interval", options->polling_interval_ms, "How often to look for topics, ms")
       ->check(CLI::Range(10, 60'000));
+  command
+      ->add_option("--qos-profile-overrides-path",
+                   options->qos_overrides,
+                   "YAML file of the QoS to subscribe with, by topic")
+      ->check(CLI::ExistingFile);
   command->footer("Exit code: 0 all recorded, 1 something was lost or the disk failed.");
   command->callback([options, &common, &action] {
     action = [options, &common] { return record(*options, common); };

@@ -195,6 +195,8 @@ SubscriptionStats FakeContext::subscription_stats(std::string_view port) const {
   return input(port).stats();
 }
 
+Qos FakeContext::subscription_qos(std::string_view port) const { return input(port).qos(); }
+
 void FakeContext::verify_nothing_left() const {
   std::vector<std::string> left;
   const auto report = [&left](auto count, std::string_view port, std::string_view what) {

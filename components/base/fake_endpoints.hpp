@@ -62,6 +62,7 @@ class FakeSubscription final : public SubscriptionBackend {
   [[nodiscard]] std::size_t publisher_count() const override { return 1; }
   [[nodiscard]] const MessageType& type() const { return type_; }
   [[nodiscard]] bool raw() const { return raw_; }
+  [[nodiscard]] const Qos& qos() const { return options_.qos; }
   [[nodiscard]] int held() const { return *held_; }
   [[nodiscard]] std::size_t waiting() const { return queue_.size(); }
 

@@ -4,6 +4,8 @@
 #include <chrono>
 #include <stdexcept>
 
+#include "qos_overrides.hpp"
+
 namespace camvox {
 namespace {
 
@@ -38,7 +40,8 @@ RecordComponent::RecordComponent(Context& context)
     : context_(context),
       config_(context.parameters<RecordConfig>()),
       regex_(parse_regex("regex", config_.regex)),
-      exclude_regex_(parse_regex("exclude_regex", config_.exclude_regex)) {}
+      exclude_regex_(parse_regex("exclude_regex", config_.exclude_regex)),
+      qos_overrides_(recording::read_qos_overrides(config_.qos_overrides)) {}
 
 RecordComponent::~RecordComponent() {
   const auto status = finish();
@@ -85,6 +88,22 @@ void RecordComponent::follow_topics() {
   }
 }
 
+/// Demands what is offered, unless the file of overrides says otherwise.
+Qos RecordComponent::qos_of(const TopicDescription& topic) {
+  const auto override = qos_overrides_.find(topic.name);
+  if (override == qos_overrides_.end()) {
+    return {kQueueDepth, topic.offered.reliable, topic.offered.latched};
+  }
+  const auto& qos = override->second;
+  if ((qos.reliable && !topic.offered.reliable) || (qos.latched && !topic.offered.latched)) {
+    context_.log().warn("{}: the QoS override demands {}, but not all publishers offer it ({})",
+                        topic.name,
+                        interfaces::to_string(qos),
+                        interfaces::to_string(topic.offered));
+  }
+  return qos;
+}
+
 void RecordComponent::record(const TopicDescription& topic) {
   const MessageType* type = interfaces::find_message_type(topic.type_name);
   storage::BagTopic entry;
@@ -107,8 +126,7 @@ void RecordComponent::record(const TopicDescription& topic) {
     subscriptions_[topic.name] = nullptr;  // told once
     return;
   }
-  const SubscribeOptions options{
-      .qos = {kQueueDepth, topic.offered.reliable, topic.offered.latched}, .required = false};
+  const SubscribeOptions options{.qos = qos_of(topic), .required = false};
   subscriptions_[topic.name] = context_.subscribe_raw(
       {topic.name, topic.name},
       topic.type_name,

@@ -5,19 +5,16 @@
 #include <algorithm>
 #include <chrono>
 #include <cstring>
-#include <fstream>
-#include <map>
-#include <sstream>
 #include <stdexcept>
 #include <utility>
 
 #include "camvox/storage/qos_profile.hpp"
+#include "qos_overrides.hpp"
 
 namespace camvox {
 namespace {
 
 constexpr std::int64_t kSecond_ns = 1'000'000'000;
-constexpr int kQueuedMessages = 4096;
 /// At the end, after so long without a frame done the last ones are given up. A loop that is closed
 /// last may take minutes on a busy machine.
 constexpr double kLongestSilence_s = 300.0;
@@ -50,29 +47,6 @@ Qos recorded_qos(const std::string& yaml) {
   result.reliable = first.reliability != Profile::Reliability::kBestEffort;
   result.latched = first.durability == Profile::Durability::kTransientLocal;
   return result;
-}
-
-/// The policies of an override that we know; a history of all becomes a long one.
-Qos to_qos(const storage::QosProfile& profile) {
-  using Profile = storage::QosProfile;
-  Qos result = qos::kDefault;
-  result.reliable = profile.reliability != Profile::Reliability::kBestEffort;
-  result.latched = profile.durability == Profile::Durability::kTransientLocal;
-  result.depth =
-      profile.history == Profile::History::kKeepAll
-          ? kQueuedMessages
-          : static_cast<int>(std::clamp<std::uint64_t>(profile.depth, 1, kQueuedMessages));
-  return result;
-}
-
-std::map<std::string, storage::QosProfile> read_overrides(const std::string& path) {
-  if (path.empty()) return {};
-  std::ifstream stream(path);
-  std::ostringstream text;
-  if (!stream || !(text << stream.rdbuf())) throw std::runtime_error(path + ": cannot be read");
-  auto overrides = storage::parse_qos_overrides(text.str(), path);
-  if (!overrides.ok()) throw std::runtime_error(overrides.status().message());
-  return *std::move(overrides);
 }
 
 /// `wanted`, or all topics, without /clock if we publish that ourselves.
@@ -204,19 +178,19 @@ void ReplayComponent::play_when_connected() {
 }
 
 void ReplayComponent::advertise_topics(const storage::BagReader& bag) {
-  const auto overrides = read_overrides(config_.qos_overrides);
+  const auto overrides = recording::read_qos_overrides(config_.qos_overrides);
   for (const auto& topic : bag.topics()) {
     const std::string name = remapped(topic.name, config_.remap);
     const auto override = overrides.find(topic.name);
     PublishOptions options{.qos = override == overrides.end()
                                       ? recorded_qos(topic.offered_qos_profiles)
-                                      : to_qos(override->second),
+                                      : override->second,
                            .max_loans = 2};
     if (!options.qos.reliable) best_effort_topics_.push_back(topic.name);
     // Messages leave on another thread, and 200 IMU samples may be handed over at once: a writer's
     // history of 5 or 10 would lose most of them. Of a latched topic the depth means something.
     if (override == overrides.end() && !options.qos.latched)
-      options.qos.depth = std::max(options.qos.depth, kQueuedMessages);
+      options.qos.depth = std::max(options.qos.depth, recording::kQueuedMessages);
     publishers_.push_back(context_.advertise_raw({topic.name, name}, topic.type, options));
     const bool frames = topic.name == config_.lockstep_topic ||
                         topic.name == config_.lockstep_topic + "/compressed";

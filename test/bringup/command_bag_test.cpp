@@ -133,6 +133,31 @@ TEST_F(CommandBag, PlayTakesTheOptionsOfRos2Bag) {
   EXPECT_EQ(command({"bag", "play", path("drive"), "--read-ahead-queue-size", "0"}).exit_code, 2);
 }
 
+TEST_F(CommandBag, RecordSubscribesAsTheFileOfOverridesSays) {
+  const auto qos = write("record_qos.yaml", "/camvox/frame_image: {reliability: best_effort}\n");
+  run(kSource);
+  const auto recorder = begin({"bag",
+                               "record",
+                               "-o",
+                               path("drive"),
+                               "/camvox/frame_image",
+                               "--qos-profile-overrides-path",
+                               qos});
+  ASSERT_TRUE(recorder->wrote("recording /camvox/frame_image")) << recorder->output();
+  const auto info = command({"topic", "info", "-v", "/camvox/frame_image"});
+  EXPECT_THAT(info.output, HasSubstr("Reliability: BEST_EFFORT"));
+  kill(recorder->pid(), SIGINT);
+  EXPECT_EQ(recorder->wait(), 0) << recorder->output();
+  EXPECT_EQ(stop(), 0) << container_->output();
+
+  const auto bad = write("bad_record.yaml", "/a: {relability: reliable}\n");
+  const auto refused =
+      command({"bag", "record", "-a", "-o", path("x"), "--qos-profile-overrides-path", bad});
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_THAT(refused.output, HasSubstr("bad_record.yaml:1: no such QoS policy: relability"));
+  EXPECT_FALSE(fs::exists(path("x")));
+}
+
 TEST_F(CommandBag, CtrlCEndsAConversionWithoutATrace) {
   // 400 MB of messages: long enough to be interrupted, at any speed that a disk has.
   {

@@ -2,6 +2,8 @@
 
 #include <gmock/gmock.h>
 
+#include <fstream>
+
 #include "bag_files.hpp"
 #include "camvox/component/fake_context.hpp"
 
@@ -66,6 +68,40 @@ TEST(RecordComponent, LeavesOutWhatIsExcludedOrNotAskedFor) {
     EXPECT_THROW(fake.send("/c", message(3)), std::logic_error);
   }
   EXPECT_EQ(recording::open_bag(folder.file("out"))->message_count(), 1U);
+}
+
+TEST(RecordComponent, DemandsWhatIsOfferedUnlessTheFileSaysOtherwise) {
+  const TemporaryFolder folder;
+  std::ofstream(folder.file("qos.yaml"))
+      << "/b: {reliability: best_effort, history: keep_last, depth: 7}\n"
+         "/c: {durability: transient_local}\n";
+  FakeContext fake;
+  fake.set_parameter("output", folder.file("out"));
+  fake.set_parameter("qos_overrides", folder.file("qos.yaml"));
+  auto latched = topic("/a", "std_msgs/msg/Header");
+  latched.offered.latched = true;
+  fake.set_topics(
+      {latched, topic("/b", "std_msgs/msg/Header"), topic("/c", "std_msgs/msg/Header")});
+  RecordComponent record(fake);
+  record.start();
+  EXPECT_TRUE(fake.subscription_qos("/a").reliable && fake.subscription_qos("/a").latched);
+  EXPECT_EQ(fake.subscription_qos("/b"), (Qos{7, false, false}));
+  EXPECT_TRUE(fake.subscription_qos("/c").latched);
+  std::string warnings;
+  for (const auto& entry : fake.log_entries()) {
+    if (entry.level == LogLevel::kWarn) warnings += entry.text + "\n";
+  }
+  EXPECT_THAT(warnings, ::testing::HasSubstr("/c: the QoS override demands"));
+  EXPECT_THAT(warnings, ::testing::Not(::testing::HasSubstr("/b")));
+}
+
+TEST(RecordComponent, AFileOfOverridesThatCannotBeReadIsAnErrorAtOnce) {
+  FakeContext fake;
+  fake.set_parameter("output", std::string("/tmp/never"));
+  fake.set_parameter("qos_overrides", std::string("/no/such/qos.yaml"));
+  EXPECT_THAT([&] { RecordComponent record(fake); },
+              ::testing::ThrowsMessage<std::runtime_error>(
+                  ::testing::HasSubstr("/no/such/qos.yaml: cannot be read")));
 }
 
 TEST(RecordComponent, NeverOverwritesARecording) {

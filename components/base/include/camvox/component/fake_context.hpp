@@ -99,6 +99,7 @@ class FakeContext final : public Context {
   [[nodiscard]] std::size_t outstanding_loans(std::string_view port) const;
   [[nodiscard]] std::size_t discarded_loans(std::string_view port) const;
   [[nodiscard]] SubscriptionStats subscription_stats(std::string_view port) const;
+  [[nodiscard]] Qos subscription_qos(std::string_view port) const;
   /// Throws std::logic_error naming every loan that is neither published nor dropped, every sample
   /// that is still held or waits, and work that was posted but not run. For the end of a test.
   void verify_nothing_left() const;

@@ -25,6 +25,7 @@ struct RecordConfig {
   /// Waits for the disk after each chunk, so that a power cut loses no more than the open one.
   bool survive_power_cut = true;
   double polling_interval_s = 0.1;  ///< How often to look for new topics.
+  std::string qos_overrides;        ///< YAML file of QoS by topic, as `ros2 bag record` takes it.
 
   template <typename Self, typename Visitor>
   static void visit(Self& self, Visitor&& field) {
@@ -39,6 +40,7 @@ struct RecordConfig {
     field("max_cache_mb", self.max_cache_mb, config::at_least(1));
     field("survive_power_cut", self.survive_power_cut);
     field("polling_interval_s", self.polling_interval_s, config::at_least(0.01));
+    field("qos_overrides", self.qos_overrides);
   }
 };
 
@@ -60,11 +62,13 @@ class RecordComponent final : public Component {
   void record(const TopicDescription& topic);
   void report();
   [[nodiscard]] bool wanted(const std::string& topic) const;
+  [[nodiscard]] Qos qos_of(const TopicDescription& topic);
 
   Context& context_;
   RecordConfig config_;
   std::regex regex_;
   std::regex exclude_regex_;
+  std::map<std::string, Qos> qos_overrides_;
   std::map<std::string, Subscription> subscriptions_;
   std::unique_ptr<recording::Recorder> recorder_;
   bool error_reported_ = false;
