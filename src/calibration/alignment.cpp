@@ -12,6 +12,7 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 using geometry::SE3;
+using geometry::Vector6d;
 
 constexpr float kOutlierShare = 0.3F;
 constexpr int kMaxSteps = 12;
@@ -29,14 +30,15 @@ float gain_over_chance(float density) {
 struct ProjectedEdge {
   Vector2d u_px;
   Vector2d normal;
-  Eigen::Matrix<double, 1, 6> J;  ///< Of the position across the edge, for a right perturbation.
+  Eigen::Matrix<double, 1, 8> J;  ///< Of the position across the edge; see Vector8d.
 };
 
 std::optional<ProjectedEdge> project(const sensors::CameraModel& camera,
-                                     const SE3& T_camera_lidar,
+                                     const Fit& fit,
                                      const Eigen::Matrix3d& R_camera_lidar,
                                      const LidarEdge& edge) {
-  const Vector3d p_camera = R_camera_lidar * edge.p_lidar + T_camera_lidar.translation();
+  const Vector3d p_lidar = edge.p_lidar - edge.widening_lidar * fit.widening_rad;
+  const Vector3d p_camera = R_camera_lidar * p_lidar + fit.T_camera_lidar.translation();
   const auto projection = camera.project_with_jacobian(p_camera);
   if (!projection || !camera.contains(projection->u_px, 2.0)) return std::nullopt;
   const Vector2d tangent = projection->J_point * (R_camera_lidar * edge.tangent_lidar);
@@ -45,8 +47,9 @@ std::optional<ProjectedEdge> project(const sensors::CameraModel& camera,
   const Vector2d normal(-tangent.y() / length, tangent.x() / length);
   const Eigen::RowVector3d J_point = normal.transpose() * projection->J_point * R_camera_lidar;
   ProjectedEdge projected{projection->u_px, normal, {}};
-  projected.J.leftCols<3>() = -J_point * geometry::skew(edge.p_lidar);
-  projected.J.rightCols<3>() = J_point;
+  projected.J.head<3>() = -J_point * geometry::skew(p_lidar);
+  projected.J.segment<3>(3) = J_point;
+  projected.J.tail<2>() = -J_point * edge.widening_lidar;
   return projected;
 }
 
@@ -133,7 +136,7 @@ NormalEquations Alignment::climb_equations(const SE3& T_camera_lidar,
       const LidarEdge& lidar_edge = scene.lidar.edges[i];
       const auto weight = static_cast<double>(lidar_edge.strength);
       equations.weight += weight;
-      const auto edge = project(camera_, T_camera_lidar, R, lidar_edge);
+      const auto edge = project(camera_, {T_camera_lidar}, R, lidar_edge);
       if (!edge) {
         equations.score += weight * static_cast<double>(gain_over_chance(0.0F));
         continue;
@@ -145,8 +148,9 @@ NormalEquations Alignment::climb_equations(const SE3& T_camera_lidar,
       const double w = weight * hit / (static_cast<double>(kOutlierShare) + hit);
       const double slope = sample.slope_px.cast<double>().dot(edge->normal);
       const double offset = sigma2 * slope / static_cast<double>(sample.density);
-      equations.H += w * edge->J.transpose() * edge->J;
-      equations.b += w * offset * edge->J.transpose();
+      const Vector6d J = edge->J.leftCols<6>().transpose();
+      equations.H.topLeftCorner<6, 6>() += w * J * J.transpose();
+      equations.b.head<6>() += w * offset * J;
       equations.inlier_weight += w;
       equations.squared_error_px2 += w * offset * offset;
     }
@@ -173,7 +177,7 @@ std::vector<SE3> Alignment::search(const SE3& T_camera_lidar,
   for (const PreparedScene& scene : scenes_) {
     for (std::size_t i = 0; i < scene.lidar.edges.size(); i += stride) {
       const LidarEdge& edge = scene.lidar.edges[i];
-      const auto projected = project(camera_, T_camera_lidar, R, edge);
+      const auto projected = project(camera_, {T_camera_lidar}, R, edge);
       if (!projected) continue;
       points.push_back({&scene.fields.front(), R * edge.p_lidar, projected->normal, edge.strength});
     }
@@ -222,14 +226,14 @@ std::vector<SE3> Alignment::search(const SE3& T_camera_lidar,
 
 SE3 Alignment::climb(const SE3& T_camera_lidar,
                      std::size_t level,
-                     const TranslationPrior& prior,
+                     const Prior& prior,
                      Part part) const {
   SE3 T = T_camera_lidar;
   const double sigma_px = scenes_.front().fields[level].sigma_px();
   for (int i = 0; i < kMaxSteps; ++i) {
     const NormalEquations equations = climb_equations(T, level, part);
     if (!(equations.inlier_weight > 0.0)) break;
-    const geometry::Vector6d step = solve_step(equations, T, prior, sigma_px);
+    const Vector6d step = solve_step(equations, {T}, prior, sigma_px).head<6>();
     T = geometry::retract(T, step);
     if (step.head<3>().norm() * camera_.intrinsics().fx_px < 0.02 * sigma_px) break;
   }
@@ -237,24 +241,21 @@ SE3 Alignment::climb(const SE3& T_camera_lidar,
 }
 
 template <typename Visit>
-void Alignment::for_each_match(const PreparedScene& scene,
-                               const SE3& T_camera_lidar,
-                               double reach_px,
-                               Part part,
-                               Visit&& visit) const {
-  const Eigen::Matrix3d R = T_camera_lidar.rotation().matrix();
+void Alignment::for_each_match(
+    const PreparedScene& scene, const Fit& fit, double reach_px, Part part, Visit&& visit) const {
+  const Eigen::Matrix3d R = fit.T_camera_lidar.rotation().matrix();
   for (std::size_t i = 0; i < scene.lidar.edges.size(); ++i) {
     if (!selected(scene, i, part)) continue;
-    const auto edge = project(camera_, T_camera_lidar, R, scene.lidar.edges[i]);
+    const auto edge = project(camera_, fit, R, scene.lidar.edges[i]);
     if (edge) visit(i, *edge, match_contrast(scene.image, *edge, reach_px));
   }
 }
 
-NormalEquations Alignment::linearise(const SE3& T_camera_lidar, double reach_px, Part part) const {
+NormalEquations Alignment::linearise(const Fit& fit, const Stage& stage, Part part) const {
   NormalEquations equations;
   for (const PreparedScene& scene : scenes_) {
     const auto add = [&](std::size_t i, const ProjectedEdge& edge, const Match& match) {
-      const auto weight = static_cast<double>(scene.lidar.edges[i].strength);
+      const double weight = stage.weight(scene.lidar.edges[i]);
       const double w = weight * match.quality;
       equations.weight += weight;
       equations.H += w * edge.J.transpose() * edge.J;
@@ -262,24 +263,31 @@ NormalEquations Alignment::linearise(const SE3& T_camera_lidar, double reach_px,
       equations.inlier_weight += w;
       equations.squared_error_px2 += w * match.offset_px * match.offset_px;
     };
-    for_each_match(scene, T_camera_lidar, reach_px, part, add);
+    for_each_match(scene, fit, stage.reach_px, part, add);
   }
   return equations;
 }
 
-std::vector<geometry::Vector6d> Alignment::tile_gradients(const SE3& T_camera_lidar,
-                                                          double reach_px) const {
-  std::vector<geometry::Vector6d> gradients;
+std::vector<Vector8d> Alignment::tile_gradients(const Fit& fit, const Stage& stage) const {
+  std::vector<Vector8d> gradients;
   for (const PreparedScene& scene : scenes_) {
     const std::size_t first = gradients.size();
-    gradients.resize(first + scene.tile_count, geometry::Vector6d::Zero());
+    gradients.resize(first + scene.tile_count, Vector8d::Zero());
     const auto add = [&](std::size_t i, const ProjectedEdge& edge, const Match& match) {
-      const double w = static_cast<double>(scene.lidar.edges[i].strength) * match.quality;
+      const double w = stage.weight(scene.lidar.edges[i]) * match.quality;
       gradients[first + scene.tiles[i]] += w * match.offset_px * edge.J.transpose();
     };
-    for_each_match(scene, T_camera_lidar, reach_px, Part::kAll, add);
+    for_each_match(scene, fit, stage.reach_px, Part::kAll, add);
   }
   return gradients;
+}
+
+std::size_t Alignment::count(EdgeKind kind) const {
+  std::size_t count = 0;
+  for (const PreparedScene& scene : scenes_) {
+    for (const LidarEdge& edge : scene.lidar.edges) count += edge.kind == kind ? 1 : 0;
+  }
+  return count;
 }
 
 std::vector<float> Alignment::densities(const PreparedScene& scene,
@@ -288,7 +296,7 @@ std::vector<float> Alignment::densities(const PreparedScene& scene,
   const Eigen::Matrix3d R = T_camera_lidar.rotation().matrix();
   std::vector<float> densities(scene.lidar.edges.size(), 0.0F);
   for (std::size_t i = 0; i < densities.size(); ++i) {
-    const auto edge = project(camera_, T_camera_lidar, R, scene.lidar.edges[i]);
+    const auto edge = project(camera_, {T_camera_lidar}, R, scene.lidar.edges[i]);
     if (edge) densities[i] = scene.fields[level].sample(edge->u_px, edge->normal).density;
   }
   return densities;
@@ -345,42 +353,39 @@ double Alignment::best_gain(std::size_t level) const {
   return count > 0.0 ? sum / count : 0.0;
 }
 
-SE3 Alignment::refine(const SE3& T_camera_lidar,
-                      double reach_px,
-                      const TranslationPrior& prior,
-                      Part part) const {
-  SE3 T = T_camera_lidar;
+Fit Alignment::refine(const Fit& start, const Stage& stage, const Prior& prior, Part part) const {
+  Fit fit = start;
   for (int i = 0; i < 2 * kMaxSteps; ++i) {
-    const NormalEquations equations = linearise(T, reach_px, part);
+    const NormalEquations equations = linearise(fit, stage, part);
     if (!(equations.inlier_weight > 0.0)) break;
-    const geometry::Vector6d step = solve_step(equations, T, prior, reach_px);
-    T = geometry::retract(T, step);
-    if (step.head<3>().norm() < 1e-6 && step.tail<3>().norm() < 1e-5) break;
+    const Vector8d step = solve_step(equations, fit, prior, stage.reach_px);
+    fit.T_camera_lidar = geometry::retract(fit.T_camera_lidar, step.head<6>());
+    fit.widening_rad += step.tail<2>();
+    if (step.head<3>().norm() < 1e-6 && step.segment<3>(3).norm() < 1e-5) break;
   }
-  return T;
+  return fit;
 }
 
-geometry::Matrix6d information(const NormalEquations& equations, double sigma_px) {
-  return equations.H * (kIndependentShare / (sigma_px * sigma_px));
+Matrix8d prior_information(const Prior& prior) {
+  Vector8d diagonal = Vector8d::Zero();
+  diagonal.segment<3>(3).setConstant(1.0 / (prior.sigma_m * prior.sigma_m));
+  diagonal.tail<2>().setConstant(1.0 / (prior.widening_sigma_rad * prior.widening_sigma_rad));
+  return diagonal.asDiagonal();
 }
 
-geometry::Matrix6d prior_information(const TranslationPrior& prior) {
-  geometry::Matrix6d result = geometry::Matrix6d::Zero();
-  result.bottomRightCorner<3, 3>() = Eigen::Matrix3d::Identity() / (prior.sigma_m * prior.sigma_m);
-  return result;
-}
-
-geometry::Vector6d solve_step(const NormalEquations& equations,
-                              const SE3& T_camera_lidar,
-                              const TranslationPrior& prior,
-                              double sigma_px) {
-  geometry::Matrix6d H = information(equations, sigma_px);
-  geometry::Vector6d b = equations.b * (kIndependentShare / (sigma_px * sigma_px));
-  H += prior_information(prior);
-  b.tail<3>() += T_camera_lidar.rotation().inverse() *
-                 (prior.t_camera_lidar - T_camera_lidar.translation()) /
-                 (prior.sigma_m * prior.sigma_m);
-  H.diagonal().array() += 1e-9 * H.diagonal().maxCoeff();
+Vector8d solve_step(const NormalEquations& equations,
+                    const Fit& fit,
+                    const Prior& prior,
+                    double sigma_px) {
+  const double scale = kIndependentShare / (sigma_px * sigma_px);
+  const Matrix8d certainty = prior_information(prior);
+  Matrix8d H = scale * equations.H + certainty;
+  Vector8d b = scale * equations.b;
+  const SE3& T = fit.T_camera_lidar;
+  b.segment<3>(3) +=
+      certainty(3, 3) * (T.rotation().inverse() * (prior.t_camera_lidar - T.translation()));
+  b.tail<2>() -= certainty(6, 6) * fit.widening_rad;
+  H.diagonal().head<6>().array() += 1e-9 * H.diagonal().head<6>().maxCoeff();
   return H.ldlt().solve(b);
 }
 

@@ -27,10 +27,21 @@ struct PreparedScene {
   std::size_t tile_count = 0;
 };
 
-/// One step's normal equations, for a right perturbation: [rotation; translation] of the lidar.
+/// What the last stage solves for: a right perturbation, [rotation; translation] of the lidar, and
+/// by how much the lidar sees near things too wide and too high, rad.
+using Vector8d = Eigen::Matrix<double, 8, 1>;
+using Matrix8d = Eigen::Matrix<double, 8, 8>;
+
+/// A pose, with what the lidar's beam adds to the outlines of things, rad: across and up.
+struct Fit {
+  geometry::SE3 T_camera_lidar;
+  Eigen::Vector2d widening_rad = Eigen::Vector2d::Zero();
+};
+
+/// One step's normal equations.
 struct NormalEquations {
-  geometry::Matrix6d H = geometry::Matrix6d::Zero();
-  geometry::Vector6d b = geometry::Vector6d::Zero();
+  Matrix8d H = Matrix8d::Zero();
+  Vector8d b = Vector8d::Zero();
   double weight = 0.0;             ///< Sum over the edges in the image.
   double inlier_weight = 0.0;      ///< The part of it that found its image edge.
   double squared_error_px2 = 0.0;  ///< Weighted, of those.
@@ -44,10 +55,30 @@ struct Gain {
   double standard_error = 0.0;
 };
 
-/// What holds the translation where the scenes do not.
-struct TranslationPrior {
+/// How the last stage looks at the edges.
+struct Stage {
+  double reach_px = 1.5;  ///< Sigma of the window across each edge.
+  /// How much edges of a kind count.
+  double reflectivity = 1.0;
+  double depth = 1.0;
+  double outline = 1.0;
+  /// What all edges have in common and no spread shows, of the lidar's resolution: both sensors
+  /// blur edges, the lidar more up and down than across.
+  double shared_error = 0.3;
+
+  [[nodiscard]] double weight(const LidarEdge& edge) const {
+    const double of_kind = edge.kind == EdgeKind::kOutline ? outline
+                           : edge.kind == EdgeKind::kDepth ? depth
+                                                           : reflectivity;
+    return of_kind * static_cast<double>(edge.strength);
+  }
+};
+
+/// What holds the translation where the scenes do not, and the widening where all is reflectivity.
+struct Prior {
   Eigen::Vector3d t_camera_lidar = Eigen::Vector3d::Zero();
   double sigma_m = 0.1;
+  double widening_sigma_rad = 1e-3;
 };
 
 /// Fits the edges of the lidar to those of the camera, in all scenes at once.
@@ -76,23 +107,22 @@ class Alignment {
   /// Climbs the score of one level.
   [[nodiscard]] geometry::SE3 climb(const geometry::SE3& T_camera_lidar,
                                     std::size_t level,
-                                    const TranslationPrior& prior,
+                                    const Prior& prior,
                                     Part part = Part::kAll) const;
 
-  /// The last stage: image contrast itself, searched across each edge within `reach_px`.
-  [[nodiscard]] geometry::SE3 refine(const geometry::SE3& T_camera_lidar,
-                                     double reach_px,
-                                     const TranslationPrior& prior,
-                                     Part part = Part::kAll) const;
+  /// The last stage: image contrast itself, searched across each edge.
+  [[nodiscard]] Fit refine(const Fit& start,
+                           const Stage& stage,
+                           const Prior& prior,
+                           Part part = Part::kAll) const;
 
-  /// The normal equations of `refine` at a pose.
-  [[nodiscard]] NormalEquations linearise(const geometry::SE3& T_camera_lidar,
-                                          double reach_px,
+  /// The normal equations of `refine`.
+  [[nodiscard]] NormalEquations linearise(const Fit& fit,
+                                          const Stage& stage,
                                           Part part = Part::kAll) const;
 
   /// The right side of `linearise`, for each tile of each scene.
-  [[nodiscard]] std::vector<geometry::Vector6d> tile_gradients(const geometry::SE3& T_camera_lidar,
-                                                               double reach_px) const;
+  [[nodiscard]] std::vector<Vector8d> tile_gradients(const Fit& fit, const Stage& stage) const;
 
   /// Of `T_new` over `T_old`, in the score of one level.
   [[nodiscard]] Gain gain(const geometry::SE3& T_new,
@@ -112,6 +142,8 @@ class Alignment {
   [[nodiscard]] double width_rad(std::size_t level) const {
     return scenes_.front().fields[level].sigma_px() / focal_px();
   }
+  /// How many edges there are of a kind, in all scenes.
+  [[nodiscard]] std::size_t count(EdgeKind kind) const;
   [[nodiscard]] double focal_px() const { return camera_.intrinsics().fx_px; }
   [[nodiscard]] std::size_t levels() const { return scenes_.front().fields.size(); }
   [[nodiscard]] const std::vector<PreparedScene>& scenes() const { return scenes_; }
@@ -127,11 +159,8 @@ class Alignment {
                                              std::size_t level) const;
   /// Calls visit(index of the edge, projected edge, match) for the edges of a scene in the image.
   template <typename Visit>
-  void for_each_match(const PreparedScene& scene,
-                      const geometry::SE3& T_camera_lidar,
-                      double reach_px,
-                      Part part,
-                      Visit&& visit) const;
+  void for_each_match(
+      const PreparedScene& scene, const Fit& fit, double reach_px, Part part, Visit&& visit) const;
 
   sensors::CameraModel camera_;
   std::vector<PreparedScene> scenes_;
@@ -141,13 +170,12 @@ class Alignment {
 inline constexpr double kIndependentShare = 0.1;
 
 /// Adds the prior and solves for a step; `sigma_px` is the error of one edge.
-[[nodiscard]] geometry::Vector6d solve_step(const NormalEquations& equations,
-                                            const geometry::SE3& T_camera_lidar,
-                                            const TranslationPrior& prior,
-                                            double sigma_px);
+[[nodiscard]] Vector8d solve_step(const NormalEquations& equations,
+                                  const Fit& fit,
+                                  const Prior& prior,
+                                  double sigma_px);
 
-/// Information (inverse covariance) of the data and of the prior, a round one: free of rotations.
-[[nodiscard]] geometry::Matrix6d information(const NormalEquations& equations, double sigma_px);
-[[nodiscard]] geometry::Matrix6d prior_information(const TranslationPrior& prior);
+/// Inverse covariance of the prior, a round one: free of rotations.
+[[nodiscard]] Matrix8d prior_information(const Prior& prior);
 
 }  // namespace camvox::calibration

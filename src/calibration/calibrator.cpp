@@ -1,5 +1,6 @@
 #include "camvox/calibration/calibrator.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -21,10 +22,17 @@ constexpr double kSamePlace =
     4.0;  ///< Two are one place within so many sigmas of the finest level.
 constexpr std::size_t kStarts = 24;  ///< Places of the grid that are climbed from.
 
-/// Reach of the last stages, in px, or in sigmas of a coarser lidar.
-double final_reach_px(const Alignment& alignment, double scale_px) {
+constexpr double kWidening = 0.3;             ///< Sigma of the widening, in resolutions.
+constexpr std::size_t kEnoughOutlines = 100;  ///< To be fitted to first.
+
+/// The last stages: their reach is in px, or in sigmas of a coarser lidar.
+Stage stage_of(const Alignment& alignment, double scale_px) {
   const double lidar_px = alignment.scenes().front().lidar.sigma_rad * alignment.focal_px();
-  return std::max(scale_px, 0.4 * lidar_px * scale_px);
+  Stage stage;
+  stage.reach_px = std::max(scale_px, 0.4 * lidar_px * scale_px);
+  // Windows over several scan lines are wide, and what is in them differs from side to side.
+  if (alignment.count(EdgeKind::kOutline) > 0) stage.shared_error = 0.6;
+  return stage;
 }
 
 /// A place that edges fit to.
@@ -55,7 +63,7 @@ void keep_different(std::vector<Climber>& climbers, double radius_rad, std::size
 /// From a guess some degrees off to the neighbourhood of the solution, best first.
 std::vector<Climber> find(const Alignment& alignment,
                           const SE3& guess,
-                          const TranslationPrior& prior,
+                          const Prior& prior,
                           double reach_rad,
                           const std::stop_token& stop) {
   std::vector<Climber> climbers;
@@ -79,16 +87,42 @@ std::vector<Climber> find(const Alignment& alignment,
 }
 
 /// From a place to a fraction of a pixel.
-SE3 refine(const Alignment& alignment,
+Fit refine(const Alignment& alignment,
            const Climber& place,
-           const TranslationPrior& prior,
+           const Prior& prior,
            const std::stop_token& stop) {
-  SE3 T = place.T_camera_lidar;
+  Fit fit{place.T_camera_lidar};
   for (const double scale_px : {4.0, 2.5, 1.5}) {
     if (stop.stop_requested()) break;
-    T = alignment.refine(T, final_reach_px(alignment, scale_px), prior);
+    fit = alignment.refine(fit, stage_of(alignment, scale_px), prior);
   }
-  return T;
+  return fit;
+}
+
+double worst_variance(const geometry::Matrix6d& covariance) {
+  using Solver = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>;
+  return Solver(covariance.topLeftCorner<3, 3>(), Eigen::EigenvaluesOnly).eigenvalues().maxCoeff();
+}
+
+/// Lets outlines lead, whose places are known best, if they alone hold all three rotations: in one
+/// turn of a spinning lidar they often follow a few posts, in several scenes they do not.
+void follow_outlines(const Alignment& alignment, const Prior& prior, Fit& fit, Stage& stage) {
+  if (alignment.count(EdgeKind::kOutline) < kEnoughOutlines) return;
+  Stage sharp = stage;
+  sharp.reflectivity = 0.5;
+  sharp.depth = 0.1;
+  sharp.outline = 15.0;
+  sharp.shared_error = 0.2;
+  // Wide windows first: the edges that led so far may have settled beside the outlines.
+  Stage wide = sharp;
+  wide.reach_px *= 2.0;
+  const Fit other = alignment.refine(alignment.refine(fit, wide, prior), sharp, prior);
+  const auto variance = [&](const Fit& of, const Stage& in) {
+    return worst_variance(covariance_of(alignment, of, in, prior));
+  };
+  if (!(variance(other, sharp) < variance(fit, stage))) return;
+  fit = other;
+  stage = sharp;
 }
 
 /// The best of the other places. One that fits well may only have been slow: where rotation and
@@ -96,11 +130,11 @@ SE3 refine(const Alignment& alignment,
 std::optional<SE3> rival_of(const Alignment& alignment,
                             const SE3& T_camera_lidar,
                             const std::vector<Climber>& places,
-                            const TranslationPrior& prior,
+                            const Prior& prior,
                             const std::stop_token& stop) {
   const double radius_rad = kSamePlace * alignment.width_rad(alignment.levels() - 1);
   for (std::size_t i = 1; i < places.size() && !stop.stop_requested(); ++i) {
-    const SE3 T = refine(alignment, places[i], prior, stop);
+    const SE3 T = refine(alignment, places[i], prior, stop).T_camera_lidar;
     if (angle_rad(T, T_camera_lidar) > radius_rad) return T;
   }
   return std::nullopt;
@@ -179,17 +213,23 @@ CalibrationResult calibrate(const std::vector<Scene>& scenes,
   if (preparation.status != CalibrationStatus::kDone) return ended(preparation.status);
   const Alignment alignment(camera, std::move(preparation.scenes));
   for (const auto& scene : alignment.scenes()) result.lidar_edges += scene.lidar.edges.size();
-  const TranslationPrior prior{T_camera_lidar_guess.translation(), config.translation_sigma_m};
-  Contest contest{T_camera_lidar_guess, {}, prior, 0.0, stop};
-  contest.reach_px = final_reach_px(alignment, 1.5);
+  const double lidar_rad = alignment.scenes().front().lidar.sigma_rad;
+  const Prior prior{
+      T_camera_lidar_guess.translation(), config.translation_sigma_m, kWidening * lidar_rad};
+  Contest contest{T_camera_lidar_guess, {}, prior, stage_of(alignment, 1.5), stop};
   if (config.method == "camvox") {
     const CamvoxCost cost(scenes.front(), camera, config.camvox);
     result.T_camera_lidar = camvox_descend(cost, T_camera_lidar_guess, config.camvox, stop);
   } else {
     const auto places =
         find(alignment, T_camera_lidar_guess, prior, config.max_rotation_deg * kDegree, stop);
-    if (!places.empty()) result.T_camera_lidar = refine(alignment, places[0], prior, stop);
-    contest.rival = rival_of(alignment, result.T_camera_lidar, places, prior, stop);
+    if (!places.empty()) {
+      Fit fit = refine(alignment, places[0], prior, stop);
+      contest.rival = rival_of(alignment, fit.T_camera_lidar, places, prior, stop);
+      follow_outlines(alignment, prior, fit, contest.stage);
+      result.T_camera_lidar = fit.T_camera_lidar;
+      result.widening_rad = fit.widening_rad;
+    }
   }
   if (stop.stop_requested()) return ended(CalibrationStatus::kCancelled);
   examine(alignment, contest, result);
@@ -233,6 +273,9 @@ std::string report_text(const CalibrationResult& r) {
       line("CamVox cost: %.2f before, %.2f after\n", r.camvox_cost_before, r.camvox_cost_after);
   report +=
       line("inlier share %.2f, halves disagree by %.3f deg\n", r.inlier_share, r.disagreement_deg);
+  report += line("the lidar's beam adds to outlines: %.3f deg across, %.3f deg up\n",
+                 r.widening_rad.x() / kDegree,
+                 r.widening_rad.y() / kDegree);
   report += line("%.2f of a perfect fit, the next best place %.2f\n", r.fit, r.rival_fit);
   return report + (r.accepted ? "accepted\n" : "refused: " + r.reason + "\n");
 }

@@ -95,8 +95,7 @@ ImageEdges::ImageEdges(const cv::Mat& grey, double sigma_px) : sigma_px_(sigma_p
   const float middle = std::max(1e-4F, quantile(slope.magnitude, 0.8));
   // The strongest edges must not outvote the many: compress to below 1.
   const cv::Mat scale = 1.0 / (slope.magnitude + middle);
-  contrast_x_ = slope.x.mul(scale);
-  contrast_y_ = slope.y.mul(scale);
+  cv::merge(std::vector<cv::Mat>{slope.x.mul(scale), slope.y.mul(scale)}, contrast_);
   ridges_ = find_ridges(slope, 0.6F * middle, kMinEdgeLength_px);
   for (Ridge& ridge : ridges_) ridge.strength /= ridge.strength + middle;
 }
@@ -104,18 +103,20 @@ ImageEdges::ImageEdges(const cv::Mat& grey, double sigma_px) : sigma_px_(sigma_p
 float ImageEdges::contrast(const Eigen::Vector2d& u_px, const Eigen::Vector2d& normal) const {
   const double x = u_px.x();
   const double y = u_px.y();
-  if (!(x >= 0.0 && y >= 0.0 && x < contrast_x_.cols - 1 && y < contrast_x_.rows - 1)) return 0.0F;
+  if (!(x >= 0.0 && y >= 0.0 && x < contrast_.cols - 1 && y < contrast_.rows - 1)) return 0.0F;
   const int column = static_cast<int>(x);
   const int row = static_cast<int>(y);
   const auto a = static_cast<float>(x - column);
   const auto b = static_cast<float>(y - row);
-  const auto at = [&](const cv::Mat& image) {
-    const float* upper = image.ptr<float>(row) + column;
-    const float* lower = image.ptr<float>(row + 1) + column;
-    return (1 - b) * ((1 - a) * upper[0] + a * upper[1]) + b * ((1 - a) * lower[0] + a * lower[1]);
+  const auto* upper = contrast_.ptr<cv::Vec2f>(row) + column;
+  const auto* lower = contrast_.ptr<cv::Vec2f>(row + 1) + column;
+  const auto nx = static_cast<float>(normal.x());
+  const auto ny = static_cast<float>(normal.y());
+  const auto across = [&](const cv::Vec2f& contrast) {
+    return contrast[0] * nx + contrast[1] * ny;
   };
-  return std::abs(at(contrast_x_) * static_cast<float>(normal.x()) +
-                  at(contrast_y_) * static_cast<float>(normal.y()));
+  return std::abs((1 - b) * ((1 - a) * across(upper[0]) + a * across(upper[1])) +
+                  b * ((1 - a) * across(lower[0]) + a * across(lower[1])));
 }
 
 }  // namespace camvox::calibration

@@ -47,7 +47,7 @@ class ImageEdges {
 
   /// Crests of the contrast, strengths between 0 and 1.
   [[nodiscard]] const std::vector<Ridge>& ridges() const { return ridges_; }
-  [[nodiscard]] cv::Size size() const { return contrast_x_.size(); }
+  [[nodiscard]] cv::Size size() const { return contrast_.size(); }
   [[nodiscard]] double sigma_px() const { return sigma_px_; }
 
   /// Contrast across a direction at a pixel, 0 to 1; 0 outside.
@@ -55,8 +55,7 @@ class ImageEdges {
 
  private:
   double sigma_px_;
-  cv::Mat contrast_x_;  ///< 32F; gradient of the log brightness, compressed to below 1.
-  cv::Mat contrast_y_;
+  cv::Mat contrast_;  ///< 32FC2; gradient of the log brightness, compressed to below 1.
   std::vector<Ridge> ridges_;
 };
 

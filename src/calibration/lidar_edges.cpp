@@ -7,6 +7,7 @@
 #include <numeric>
 #include <opencv2/imgproc.hpp>
 
+#include "outlines.hpp"
 #include "ridge.hpp"
 
 namespace camvox::calibration {
@@ -50,11 +51,11 @@ class Panorama {
   int rows_;
 };
 
-/// A return in the view: where, how far, and its rank in reflectivity, 0 to 1.
+/// A return in the view, in the order of the cloud: where, how far, and its rank in reflectivity.
 struct Return {
   Vector2d cell;
   float inverse_range;  ///< 1 / m
-  float rank;
+  float rank;           ///< 0 to 1
 };
 
 /// Reflectivities become ranks: comparable between lidars, and robust to retroreflectors.
@@ -409,7 +410,24 @@ LidarEdge make_edge(const Candidate& candidate, const Smooth& smooth, const Pano
       (panorama.bearing_lidar(place + along) - panorama.bearing_lidar(place - along)).normalized();
   edge.strength = ridge.strength;
   edge.kind = candidate.kind;
+  if (candidate.kind == EdgeKind::kReflectivity) return edge;
+  for (int axis = 0; axis < 2; ++axis) {
+    const Vector2d unit = Vector2d::Unit(axis);
+    const Vector3d e_lidar =
+        (panorama.bearing_lidar(place + unit) - panorama.bearing_lidar(place - unit)).normalized();
+    // The gradient of the inverse range points to what is near.
+    edge.widening_lidar.col(axis) = -ridge.normal[axis] * edge.p_lidar.norm() * e_lidar;
+  }
   return edge;
+}
+
+std::vector<Vector3d> in_space(const std::vector<Return>& returns, const Panorama& panorama) {
+  std::vector<Vector3d> points_lidar;
+  points_lidar.reserve(returns.size());
+  for (const Return& r : returns) {
+    points_lidar.push_back(panorama.bearing_lidar(r.cell) / static_cast<double>(r.inverse_range));
+  }
+  return points_lidar;
 }
 
 }  // namespace
@@ -434,12 +452,17 @@ LidarEdges extract_lidar_edges(const std::vector<Eigen::Vector4f>& points_lidar,
   const Smooth smooth = smooth_images(returns, panorama, sigma, stop);
   if (stop.stop_requested()) return {};
   std::vector<Candidate> candidates;
-  collect(smooth, sigma, spacing_rad > 2.0 * view.min_cell_rad, config, candidates);
+  const bool in_lines = spacing_rad > 2.0 * view.min_cell_rad;
+  collect(smooth, sigma, in_lines, config, candidates);
   for (const Candidate& candidate :
        spread_evenly(std::move(candidates), panorama, config.max_edges)) {
     result.edges.push_back(make_edge(candidate, smooth, panorama));
   }
   rank_strengths(result.edges);
+  if (in_lines) {
+    const auto outlines = find_outlines(in_space(returns, panorama), config.min_depth_ratio);
+    result.edges.insert(result.edges.end(), outlines.begin(), outlines.end());
+  }
   result.sigma_rad = sigma * panorama.cell_rad();
   return result;
 }

@@ -51,7 +51,7 @@ std::vector<Line> project_edges(const LidarEdges& lidar,
     if (!u_px || !next_px || !camera.contains(*u_px, 1.0)) continue;
     const Eigen::Vector2d along = (*next_px - *u_px).normalized();
     if (!along.allFinite()) continue;
-    const bool depth = edge.kind == EdgeKind::kDepth;
+    const bool depth = edge.kind != EdgeKind::kReflectivity;
     lines.push_back({{u_px->x(), u_px->y()},
                      {along.x(), along.y()},
                      depth ? cv::Scalar(60, 60, 255) : cv::Scalar(60, 255, 60),

@@ -61,7 +61,11 @@ CalibrationStatus prepare_one(const Scene& scene,
   for (const double level_deg : kLevels_deg) {
     if (stop.stop_requested()) return CalibrationStatus::kCancelled;
     const double sigma_px = std::max(level_deg * kDegree * intrinsics.fx_px, coarse_px);
-    fields.emplace_back(image.ridges(), grey.size(), sigma_px);
+    if (!fields.empty() && fields.back().sigma_px() == sigma_px) {
+      fields.push_back(fields.back());  // shares its memory
+    } else {
+      fields.emplace_back(image.ridges(), grey.size(), sigma_px);
+    }
   }
   if (fine_px < coarse_px) image = ImageEdges(grey, fine_px);
   prepared.push_back({std::move(lidar), std::move(image), std::move(fields), {}, {}, 0});

@@ -16,10 +16,7 @@ using geometry::Vector6d;
 
 constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kObservable_m = 0.02;  ///< A translation known this well is observed.
-/// What all edges have in common and no spread shows, of the lidar's resolution: both sensors blur
-/// edges, the lidar more up and down than across. It turns, or moves what is `kDepth_m` away.
-constexpr double kSharedError = 0.3;
-constexpr double kDepth_m = 10.0;
+constexpr double kDepth_m = 10.0;       ///< A shared error turns, or moves what is so far away.
 
 double angle_deg(const SE3& T_a, const SE3& T_b) {
   return (T_a.rotation().inverse() * T_b.rotation()).angle_rad() / kDegree;
@@ -28,15 +25,16 @@ double angle_deg(const SE3& T_a, const SE3& T_b) {
 /// How far the offsets that `linearise` finds follow a rotation: the mean of a window follows an
 /// edge only in part. The derivative of its right side, by central differences, over H.
 double following(const Alignment& alignment,
-                 const SE3& T_camera_lidar,
-                 double reach_px,
-                 const Matrix6d& H) {
-  const double step_rad = 0.2 * reach_px / alignment.focal_px();
+                 const Fit& fit,
+                 const Stage& stage,
+                 const Matrix8d& H) {
+  const double step_rad = 0.2 * stage.reach_px / alignment.focal_px();
   Eigen::Matrix3d slope;
   for (int i = 0; i < 3; ++i) {
     const Vector6d step = step_rad * Vector6d::Unit(i);
     const auto b = [&](double side) {
-      return alignment.linearise(geometry::retract(T_camera_lidar, side * step), reach_px).b;
+      const SE3 T = geometry::retract(fit.T_camera_lidar, side * step);
+      return alignment.linearise({T, fit.widening_rad}, stage).b;
     };
     slope.col(i) = (b(-1.0) - b(1.0)).head<3>() / (2.0 * step_rad);
   }
@@ -48,11 +46,11 @@ void add_precision(const Alignment& alignment,
                    const Contest& contest,
                    const Vector6d& between_halves,
                    CalibrationResult& result) {
-  const NormalEquations equations = alignment.linearise(result.T_camera_lidar, contest.reach_px);
+  const Fit fit{result.T_camera_lidar, result.widening_rad};
+  const NormalEquations equations = alignment.linearise(fit, contest.stage);
   result.inlier_share = equations.weight > 0.0 ? equations.inlier_weight / equations.weight : 0.0;
   if (!(equations.inlier_weight > 0.0)) return;
-  const Matrix6d covariance =
-      covariance_of(alignment, result.T_camera_lidar, contest.reach_px, contest.prior);
+  const Matrix6d covariance = covariance_of(alignment, fit, contest.stage, contest.prior);
   // Each half has twice the variance, their difference four times.
   const double surprise =
       between_halves.head<3>().squaredNorm() / (4.0 * covariance.topLeftCorner<3, 3>().trace());
@@ -76,25 +74,27 @@ std::string number(const char* format, double a, double b) {
 }  // namespace
 
 Matrix6d covariance_of(const Alignment& alignment,
-                       const SE3& T_camera_lidar,
-                       double reach_px,
-                       const TranslationPrior& prior) {
-  const NormalEquations equations = alignment.linearise(T_camera_lidar, reach_px);
-  const Matrix6d prior_share = prior_information(prior);
-  const double scale = kIndependentShare / (reach_px * reach_px);  // as solve_step weighs the data
-  Matrix6d spread = Matrix6d::Zero();
+                       const Fit& fit,
+                       const Stage& stage,
+                       const Prior& prior) {
+  const NormalEquations equations = alignment.linearise(fit, stage);
+  const Matrix8d prior_share = prior_information(prior);
+  const double scale =
+      kIndependentShare / std::pow(stage.reach_px, 2);  // as solve_step weighs the data
+  Matrix8d spread = Matrix8d::Zero();
   double tiles = 0.0;
-  for (const Vector6d& gradient : alignment.tile_gradients(T_camera_lidar, reach_px)) {
+  for (const Vector8d& gradient : alignment.tile_gradients(fit, stage)) {
     spread += gradient * gradient.transpose();
     tiles += gradient.isZero(0.0) ? 0.0 : 1.0;
   }
   // As many tiles are used up as there are unknowns.
   spread *= scale * scale * tiles / std::max(1.0, tiles - 6.0);
-  const double share = following(alignment, T_camera_lidar, reach_px, equations.H);
-  const Matrix6d slope = scale * share * equations.H + prior_share;
-  const Matrix6d inverse = slope.ldlt().solve(Matrix6d::Identity());
-  Matrix6d covariance = inverse * (spread + prior_share) * inverse.transpose();
-  const double shared_rad = kSharedError * alignment.scenes().front().lidar.sigma_rad;
+  const double share = following(alignment, fit, stage, equations.H);
+  const Matrix8d slope = scale * share * equations.H + prior_share;
+  const Matrix8d inverse = slope.ldlt().solve(Matrix8d::Identity());
+  Matrix6d covariance =
+      (inverse * (spread + prior_share) * inverse.transpose()).topLeftCorner<6, 6>();
+  const double shared_rad = stage.shared_error * alignment.scenes().front().lidar.sigma_rad;
   covariance.diagonal().head<3>().array() += std::pow(shared_rad, 2);
   covariance.diagonal().tail<3>().array() += std::pow(shared_rad * kDepth_m, 2);
   return covariance;
@@ -104,8 +104,8 @@ void examine(const Alignment& alignment, const Contest& contest, CalibrationResu
   const std::size_t level = alignment.levels() - 1;
   const SE3& T = result.T_camera_lidar;
   const auto fit = [&](Part part) {
-    return alignment.refine(
-        alignment.climb(T, level, contest.prior, part), contest.reach_px, contest.prior, part);
+    const Fit start{alignment.climb(T, level, contest.prior, part), result.widening_rad};
+    return alignment.refine(start, contest.stage, contest.prior, part).T_camera_lidar;
   };
   const auto stopped = [&] { return contest.stop.stop_requested(); };
   const SE3 even = fit(Part::kEven);

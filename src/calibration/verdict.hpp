@@ -13,9 +13,9 @@ namespace camvox::calibration {
 struct Contest {
   geometry::SE3 guess;                 ///< The extrinsics in force.
   std::optional<geometry::SE3> rival;  ///< The best of the other places that edges fit to.
-  TranslationPrior prior;
-  double reach_px = 1.5;  ///< Of the refinement that gave the result.
-  std::stop_token stop;   ///< Ends the examination with whatever numbers there are.
+  Prior prior;
+  Stage stage;           ///< The last one, that gave the result.
+  std::stop_token stop;  ///< Ends the examination with whatever numbers there are.
 };
 
 /// Covariance (right perturbation) of a pose from Alignment::refine: the sandwich of an
@@ -23,9 +23,9 @@ struct Contest {
 /// the spread of that sum from tile to tile, in which errors that many edges share count in full.
 /// Source: Huber 1967; with clusters, Liang & Zeger, Biometrika 1986.
 [[nodiscard]] geometry::Matrix6d covariance_of(const Alignment& alignment,
-                                               const geometry::SE3& T_camera_lidar,
-                                               double reach_px,
-                                               const TranslationPrior& prior);
+                                               const Fit& fit,
+                                               const Stage& stage,
+                                               const Prior& prior);
 
 /// Fills in the numbers by which a result is judged, from its T_camera_lidar.
 void examine(const Alignment& alignment, const Contest& contest, CalibrationResult& result);

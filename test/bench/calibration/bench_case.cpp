@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <functional>
 
 #include "real_pairs.hpp"
 #include "simulated_stop.hpp"
@@ -70,6 +71,42 @@ BenchCase case_of(std::string name, test::RealPair pair) {
   return result;
 }
 
+BenchCase kitti_group(const fs::path& kitti, const std::string& drive, int first) {
+  BenchCase group;
+  for (int k = 0; k < 10; ++k) {
+    auto pair = test::kitti_frame(kitti, drive, first + 14 * k);
+    group.intrinsics = pair.intrinsics;
+    group.T_camera_lidar = pair.T_camera_lidar;
+    group.scenes.push_back(std::move(pair.scene));
+  }
+  group.name = "KITTI 10 frames from " + std::to_string(first);
+  return group;
+}
+
+std::vector<std::function<BenchCase()>> real_makers() {
+  std::vector<std::function<BenchCase()>> makers;
+  const fs::path pairs = fs::path(SHARED_DATA) / "lidar_camera_pairs";
+  const fs::path kitti = fs::path(SHARED_DATA) / "kitti_0013";
+  const std::string drive = "2011_09_26_drive_0013_sync";
+  if (fs::exists(pairs)) {
+    for (const char which : {'a', 'b'}) {
+      makers.emplace_back(
+          [=] { return case_of(std::string("junction_") + which, test::junction(pairs, which)); });
+    }
+  }
+  if (!fs::exists(kitti)) return makers;
+  for (const int frame : {0, 35, 70, 105, 140}) {
+    makers.emplace_back([=] {
+      return case_of("KITTI frame " + std::to_string(frame),
+                     test::kitti_frame(kitti, drive, frame));
+    });
+  }
+  for (const int first : {0, 5, 10}) {
+    makers.emplace_back([=] { return kitti_group(kitti, drive, first); });
+  }
+  return makers;
+}
+
 }  // namespace
 
 std::size_t synthetic_count() { return kStops.size(); }
@@ -84,32 +121,8 @@ BenchCase synthetic_case(std::size_t index) {
           test::true_T_camera_lidar()};
 }
 
-std::vector<BenchCase> real_cases() {
-  std::vector<BenchCase> cases;
-  const fs::path pairs = fs::path(SHARED_DATA) / "lidar_camera_pairs";
-  const fs::path kitti = fs::path(SHARED_DATA) / "kitti_0013";
-  const std::string drive = "2011_09_26_drive_0013_sync";
-  if (fs::exists(pairs)) {
-    cases.push_back(case_of("junction_a", test::junction(pairs, 'a')));
-    cases.push_back(case_of("junction_b", test::junction(pairs, 'b')));
-  }
-  if (!fs::exists(kitti)) return cases;
-  for (const int frame : {0, 35, 70, 105, 140}) {
-    cases.push_back(
-        case_of("KITTI frame " + std::to_string(frame), test::kitti_frame(kitti, drive, frame)));
-  }
-  for (const int first : {0, 5, 10}) {
-    BenchCase group;
-    for (int k = 0; k < 10; ++k) {
-      auto pair = test::kitti_frame(kitti, drive, first + 14 * k);
-      group.intrinsics = pair.intrinsics;
-      group.T_camera_lidar = pair.T_camera_lidar;
-      group.scenes.push_back(std::move(pair.scene));
-    }
-    group.name = "KITTI 10 frames from " + std::to_string(first);
-    cases.push_back(std::move(group));
-  }
-  return cases;
-}
+std::size_t real_count() { return real_makers().size(); }
+
+BenchCase real_case(std::size_t index) { return real_makers().at(index)(); }
 
 }  // namespace camvox::bench

@@ -21,7 +21,8 @@ struct BenchCase {
 [[nodiscard]] std::size_t synthetic_count();
 /// One of them; rendered once and kept in the build folder.
 [[nodiscard]] BenchCase synthetic_case(std::size_t index);
-/// Junctions, single frames and groups of ten frames of KITTI; empty without the shared data.
-[[nodiscard]] std::vector<BenchCase> real_cases();
+/// Junctions, single frames and groups of ten frames of KITTI; none without the shared data.
+[[nodiscard]] std::size_t real_count();
+[[nodiscard]] BenchCase real_case(std::size_t index);
 
 }  // namespace camvox::bench

@@ -185,8 +185,7 @@ int run(int argc, char** argv) {
   } else if (mode == "camvox") {
     run_camvox(work);
   } else if (mode == "real") {
-    const auto cases = real_cases();
-    run_all(work, cases.size(), [&](std::size_t i) { return cases[i]; });
+    run_all(work, real_count(), real_case);
   } else {
     run_all(work, synthetic_count(), synthetic_case);
   }

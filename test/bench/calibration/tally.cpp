@@ -45,10 +45,14 @@ void Tally::add(const BenchCase& bench_case,
   if (!result.accepted && error_deg <= limits_.good_deg) ++good_refused_;
   std::fprintf(
       stderr,
-      "%s: %.3f deg, %.3f m, sigma %.3f deg, score %.2f/%.2f, held back %.2f/%.2f +- "
+      "%s: %.3f deg (%+.3f %+.3f %+.3f), %.3f m, sigma %.3f deg, score %.2f/%.2f, held back "
+      "%.2f/%.2f +- "
       "%.2f, fit %.2f +- %.2f, rival %.2f by %.1f sigma, inlier %.2f, halves %.3f deg: %s\n",
       bench_case.name.c_str(),
       error_deg,
+      error[0] / kDegree,
+      error[1] / kDegree,
+      error[2] / kDegree,
       error.tail<3>().norm(),
       result.sigma_rotation_deg,
       result.score_before,

@@ -61,5 +61,25 @@ TEST(Verdict, ASparseScanIsKnownLessWell) {
   EXPECT_GT(result.fit, result.rival_fit);
 }
 
+TEST(Verdict, SeveralSparseScansAreKnownWell) {
+  const std::filesystem::path kitti = std::filesystem::path(SHARED_DATA) / "kitti_0013";
+  if (!std::filesystem::exists(kitti)) GTEST_SKIP() << kitti << " is absent";
+  std::vector<Scene> scenes;
+  test::RealPair pair;
+  for (int k = 0; k < 10; ++k) {
+    pair = test::kitti_frame(kitti, "2011_09_26_drive_0013_sync", 5 + 14 * k);
+    scenes.push_back(std::move(pair.scene));
+  }
+  const auto result = calibrate(scenes, pair.intrinsics, off(pair.T_camera_lidar));
+  ASSERT_EQ(result.status, CalibrationStatus::kDone);
+  EXPECT_TRUE(result.accepted) << result.reason;
+  const Vector6d error = geometry::local(pair.T_camera_lidar, result.T_camera_lidar);
+  EXPECT_LT(error.head<3>().norm() / kDegree, 0.2);  // 0.4 without outlines and widening
+  EXPECT_LT(std::sqrt(normalised(result, pair.T_camera_lidar)), 2.0);
+  // The beam of an HDL-64E widens to 2 mrad: what it grazes looks wider by half of that or more.
+  EXPECT_GT(result.widening_rad.x(), 0.5e-3);
+  EXPECT_LT(result.widening_rad.x(), 3e-3);
+}
+
 }  // namespace
 }  // namespace camvox::calibration

@@ -99,6 +99,8 @@ struct CalibrationResult {
   double nid_after = 1.0;
   double camvox_cost_before = 0.0;  ///< The paper's cost, px; of the first scene.
   double camvox_cost_after = 0.0;
+  /// By how much the lidar sees near things too wide and too high, which is solved for as well.
+  Eigen::Vector2d widening_rad = Eigen::Vector2d::Zero();
   double inlier_share = 0.0;
   double disagreement_deg = 0.0;     ///< Largest, between the result and the fits of both halves.
   double sigma_rotation_deg = 0.0;   ///< Of the worst-known axis.
@@ -113,9 +115,10 @@ struct CalibrationResult {
 /// `edges`: edges of reflectivity and depth (see extract_lidar_edges) are fitted to the image's in
 /// four levels from 0.8 degrees to a pixel. A grid over rotations finds where to start, expectation
 /// maximisation climbs the levels in 6 DoF, the translation held by its prior where the scenes do
-/// not determine it. Ideas: Levinson & Thrun, "Automatic online calibration of cameras and
-/// lasers", RSS 2013 (edges); Yuan et al., RA-L 2021 (edges in 3D); Koide et al., ICRA 2023 (NID).
-/// `camvox`: see camvox_method.hpp.
+/// not determine it. The last stage also finds by how much the lidar's beam widens near things,
+/// and follows the sharp outlines of a spinning lidar if they hold all rotations. Ideas: Levinson &
+/// Thrun, "Automatic online calibration of cameras and lasers", RSS 2013 (edges); Yuan et al., RA-L
+/// 2021 (edges in 3D); Koide et al., ICRA 2023 (NID). `camvox`: see camvox_method.hpp.
 ///
 /// The verdict is the same for both methods: a fit to each half of the view (a chessboard of
 /// tiles) is judged on the other half, against the old extrinsics. Deterministic, without threads;

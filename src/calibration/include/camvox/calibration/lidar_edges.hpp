@@ -13,14 +13,18 @@ namespace camvox::calibration {
 /// Why a camera should see an edge at a place.
 enum class EdgeKind : std::uint8_t {
   kReflectivity,  ///< The surface changes its reflectivity; its depth goes on.
-  kDepth          ///< A nearer surface ends; the point lies on that one.
+  kDepth,         ///< A nearer surface ends; the point lies on that one.
+  kOutline        ///< The same, found between two neighbouring returns of one scan line.
 };
 
 /// A piece of an edge that the lidar saw, in the lidar frame.
 struct LidarEdge {
   Eigen::Vector3d p_lidar;
   Eigen::Vector3d tangent_lidar;  ///< Unit vector along the edge, across the line of sight.
-  float strength = 0.0F;          ///< 0 to 1: rank among the edges of its kind.
+  /// By how much the point moves, m, for each radian by which the lidar sees near things too wide
+  /// (column 0, along the view's rows) and too high (column 1). Zero for reflectivity.
+  Eigen::Matrix<double, 3, 2> widening_lidar = Eigen::Matrix<double, 3, 2>::Zero();
+  float strength = 0.0F;  ///< 0 to 1: rank among the edges of its kind.
   EdgeKind kind = EdgeKind::kReflectivity;
 };
 
@@ -65,8 +69,10 @@ struct LidarEdges {
 /// panorama around the lidar itself, in which nothing hides anything. Returns are averaged in
 /// cells and smoothed by normalised convolution as wide as the returns are dense, so that the same
 /// code reads a few seconds of a Livox and one turn of a spinning lidar. Edges of depth are put on
-/// the nearer surface; where depth jumps, reflectivity is no edge of its own (no bleeding). Empty
-/// if there are too few returns, or `stop` asks. `R_view_lidar` only needs to be roughly right.
+/// the nearer surface; where depth jumps, reflectivity is no edge of its own (no bleeding).
+/// Where scan lines are farther apart than pixels (one turn of a spinning lidar), outlines come on
+/// top: see find_outlines in outlines.hpp. Empty if there are too few returns, or `stop` asks.
+/// `R_view_lidar` only needs to be roughly right.
 ///
 /// Idea of depth-continuous edges: Yuan et al., "Pixel-level extrinsic self calibration of high
 /// resolution lidar and camera in targetless environments", RA-L 2021. Normalised convolution:
