@@ -47,6 +47,11 @@ std::string to_json(const EvaluateOptions& options, const Evaluation& result) {
                         result.kitti->t_rel_percent,
                         result.kitti->r_rel_deg_per_100m);
   }
+  if (result.revisit_m.count > 0) {
+    text += fmt::format("  \"revisit_m\": {},\n  \"revisit_deg\": {},\n",
+                        json_of(result.revisit_m),
+                        json_of(result.revisit_deg));
+  }
   return text +
          fmt::format(
              "  \"ape_m\": {},\n  \"ape_deg\": {},\n  \"rpe_m\": {},\n  \"rpe_deg\": {}\n}}\n",
@@ -79,7 +84,7 @@ int run(const EvaluateOptions& options) {
 void add_evaluate(CLI::App& app, Action& action) {
   auto options = std::make_shared<EvaluateOptions>();
   auto* command =
-      app.add_subcommand("evaluate", "Compare a trajectory with a reference (APE, RPE)");
+      app.add_subcommand("evaluate", "Compare a trajectory with a reference (APE, RPE, revisits)");
   command->add_option("reference", options->reference, "TUM or KITTI file, or a bag with poses")
       ->required();
   command->add_option("estimate", options->estimate, "The same")->required();

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <tuple>
+#include <utility>
 
 #include "camvox/trajectory/alignment.hpp"
 #include "command.hpp"
@@ -20,19 +22,25 @@ std::vector<double> scaled(std::vector<double> values, double factor) {
   return values;
 }
 
-void add_relative(const EvaluationOptions& options, Evaluation& result) {
-  const auto errors = options.delta_unit == "m"
-                          ? trajectory::relative_errors_by_path(result.aligned, options.delta)
-                          : trajectory::relative_errors_by_frames(
-                                result.aligned, static_cast<std::size_t>(options.delta));
+/// The two parts of relative errors, in m and degrees.
+std::pair<Statistics, Statistics> parts(const std::vector<trajectory::RelativeError>& errors) {
   std::vector<double> translation_m;
   std::vector<double> rotation_deg;
   for (const auto& error : errors) {
     translation_m.push_back(error.translation_m);
     rotation_deg.push_back(kDegrees * error.rotation_rad);
   }
-  result.rpe_m = trajectory::statistics(translation_m);
-  result.rpe_deg = trajectory::statistics(rotation_deg);
+  return {trajectory::statistics(translation_m), trajectory::statistics(rotation_deg)};
+}
+
+void add_relative(const EvaluationOptions& options, Evaluation& result) {
+  const auto errors = options.delta_unit == "m"
+                          ? trajectory::relative_errors_by_path(result.aligned, options.delta)
+                          : trajectory::relative_errors_by_frames(
+                                result.aligned, static_cast<std::size_t>(options.delta));
+  std::tie(result.rpe_m, result.rpe_deg) = parts(errors);
+  std::tie(result.revisit_m, result.revisit_deg) =
+      parts(trajectory::revisit_errors(result.aligned));
 }
 
 std::string row(const std::string& name, const Statistics& s) {
@@ -47,6 +55,14 @@ std::string row(const std::string& name, const Statistics& s) {
       s.rmse,
       s.sse,
       s.std);
+}
+
+std::string table_head() {
+  constexpr auto kNames = "| {:<18} | {:>9} | {:>9} | {:>9} | {:>9} | {:>9} | {:>11} | {:>9} |\n";
+  constexpr auto kRule =
+      "| {:-<18} | {:->9} | {:->9} | {:->9} | {:->9} | {:->9} | {:->11} | {:->9} |\n";
+  return fmt::format(kNames, "", "max", "mean", "median", "min", "rmse", "sse", "std") +
+         fmt::format(kRule, "", "", "", "", "", "", "", "");
 }
 
 }  // namespace
@@ -103,25 +119,7 @@ std::string to_markdown(const EvaluationOptions& options, const Evaluation& resu
       options.alignment,
       result.scale ? fmt::format(", scale error {:+.3f} %", 100.0 * (1.0 / *result.scale - 1.0))
                    : "");
-  text += fmt::format("| {:<18} | {:>9} | {:>9} | {:>9} | {:>9} | {:>9} | {:>11} | {:>9} |\n",
-                      "",
-                      "max",
-                      "mean",
-                      "median",
-                      "min",
-                      "rmse",
-                      "sse",
-                      "std");
-  text +=
-      fmt::format("| {:-<18} | {:->9} | {:->9} | {:->9} | {:->9} | {:->9} | {:->11} | {:->9} |\n",
-                  "",
-                  "",
-                  "",
-                  "",
-                  "",
-                  "",
-                  "",
-                  "");
+  text += table_head();
   text += row("APE (m)", result.ape_m);
   text += row("APE rotation (deg)", result.ape_deg);
   const auto delta = fmt::format("{:g} {}", options.delta, options.delta_unit);
@@ -137,6 +135,14 @@ std::string to_markdown(const EvaluationOptions& options, const Evaluation& resu
         result.kitti->t_rel_percent,
         result.kitti->r_rel_deg_per_100m,
         result.kitti->stretches);
+  }
+  if (result.revisit_m.count > 0) {
+    text += fmt::format(
+        "\n{} poses are at places passed before in the same direction; between the two passes:\n\n",
+        result.revisit_m.count);
+    text += table_head();
+    text += row("revisit (m)", result.revisit_m);
+    text += row("revisit (deg)", result.revisit_deg);
   }
   return text;
 }

@@ -34,6 +34,8 @@ struct Evaluation {
   trajectory::Statistics ape_deg;
   trajectory::Statistics rpe_m;
   trajectory::Statistics rpe_deg;
+  trajectory::Statistics revisit_m;  ///< Of trajectory::revisit_errors.
+  trajectory::Statistics revisit_deg;
   std::optional<trajectory::KittiErrors> kitti;
 };
 

@@ -102,6 +102,29 @@ std::vector<RelativeError> relative_errors_by_frames(const std::vector<PosePair>
   return errors;
 }
 
+std::vector<RelativeError> revisit_errors(const std::vector<PosePair>& pairs,
+                                          const RevisitRule& rule) {
+  const auto driven_m = distances_m(pairs, &PosePair::reference);
+  std::vector<RelativeError> errors;
+  for (std::size_t to = 0; to < pairs.size(); ++to) {
+    const geometry::SE3& T_to = pairs[to].reference.T_world_body;
+    double nearest_m = rule.max_distance_m;
+    std::optional<std::size_t> nearest;
+    for (std::size_t from = 0; driven_m[to] - driven_m[from] > rule.min_travel_m; ++from) {
+      const geometry::SE3& T_from = pairs[from].reference.T_world_body;
+      const double distance_m = (T_to.translation() - T_from.translation()).norm();
+      if (distance_m > nearest_m) continue;
+      if ((T_from.rotation().inverse() * T_to.rotation()).angle_rad() > rule.max_turn_rad) continue;
+      nearest_m = distance_m;
+      nearest = from;
+    }
+    if (nearest) {
+      errors.push_back(relative_error(pairs, *nearest, to, driven_m[to] - driven_m[*nearest]));
+    }
+  }
+  return errors;
+}
+
 std::optional<KittiErrors> kitti_errors(const std::vector<PosePair>& pairs,
                                         const std::vector<double>& lengths_m) {
   const auto driven_m = distances_m(pairs, &PosePair::reference);

@@ -49,6 +49,37 @@ TEST(RelativeErrors, ByPathTakeStretchesOfTheEstimate) {
   }
 }
 
+TEST(RevisitErrors, AreBetweenTwoPassesOfAPlace) {
+  // Twice around a square of 10 m in steps of 1 m; the estimate drifts by 1 cm a step along x.
+  std::vector<PosePair> pairs;
+  geometry::SE3 T;
+  for (int i = 0; i < 80; ++i) {
+    const geometry::SE3 drift(geometry::SO3(), {0.01 * i, 0.0, 0.0});
+    pairs.push_back({{i, T}, {i, drift * T}});
+    const double turn_rad = i % 10 == 9 ? M_PI / 2 : 0.0;
+    T = T * geometry::SE3(geometry::SO3::exp({0.0, 0.0, turn_rad}), {1.0, 0.0, 0.0});
+  }
+  const auto errors = revisit_errors(pairs);
+  ASSERT_EQ(errors.size(), 40U) << "the whole second lap";
+  for (const auto& error : errors) {
+    EXPECT_EQ(error.to - error.from, 40U);
+    EXPECT_NEAR(error.translation_m, 0.4, 1e-9);
+    EXPECT_NEAR(error.rotation_rad, 0.0, 1e-9);
+  }
+  EXPECT_TRUE(revisit_errors(straight(50, 1.0)).empty());
+  EXPECT_TRUE(revisit_errors({}).empty());
+}
+
+TEST(RevisitErrors, TheOtherDirectionIsNone) {
+  auto pairs = straight(50, 1.0);
+  const geometry::SE3 back(geometry::SO3::exp({0.0, 0.0, M_PI}), {0.0, 0.0, 0.0});
+  for (int i = 50; i >= 0; --i) {
+    const geometry::SE3 T = geometry::SE3(geometry::SO3(), {1.0 * i, 0.0, 0.0}) * back;
+    pairs.push_back({{101 - i, T}, {101 - i, T}});
+  }
+  EXPECT_TRUE(revisit_errors(pairs).empty());
+}
+
 TEST(RelativeErrors, ByFramesTakeConsecutiveStretches) {
   const auto errors = relative_errors_by_frames(straight(10, 1.0, 0.01), 3);
   ASSERT_EQ(errors.size(), 3U);

@@ -49,6 +49,18 @@ struct RelativeError {
 [[nodiscard]] std::vector<RelativeError> relative_errors_by_frames(
     const std::vector<PosePair>& pairs, std::size_t frames);
 
+/// What counts as passing the same place again, in the reference.
+struct RevisitRule {
+  double max_distance_m = 2.0;
+  double max_turn_rad = 0.5;   ///< More is a crossing, or the other direction.
+  double min_travel_m = 20.0;  ///< In between; less is just going slowly.
+};
+
+/// Errors between each pose and the nearest of those that passed the same place before: near zero
+/// where a loop was closed, as large as the drift where it was not. Quadratic in the poses.
+[[nodiscard]] std::vector<RelativeError> revisit_errors(const std::vector<PosePair>& pairs,
+                                                        const RevisitRule& rule = {});
+
 /// KITTI odometry's measure: mean relative errors over all stretches of 100, 200, ... 800 m that
 /// begin at every tenth frame (Geiger et al., CVPR 2012).
 struct KittiErrors {
