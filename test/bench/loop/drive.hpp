@@ -3,6 +3,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <random>
 #include <string>
 #include <vector>
@@ -10,6 +11,7 @@
 #include "camvox/depth/sample_depth.hpp"
 #include "camvox/features/feature_extractor.hpp"
 #include "camvox/features/undistorter.hpp"
+#include "camvox/optimization/point_observation.hpp"
 #include "camvox/simulation/simulator.hpp"
 #include "camvox/tracking/keyframe.hpp"
 
@@ -22,9 +24,11 @@ struct Drive {
   std::vector<tracking::Keyframe> frames;  ///< T_map_camera is the truth in the world frame.
   optimization::PinholeCamera camera;
 
+  /// `given`: the motion when options.motion is "given".
   static Drive make(simulation::SimulationOptions options,
                     double rate_hz,
-                    const std::filesystem::path& cache) {
+                    const std::filesystem::path& cache,
+                    std::optional<simulation::Trajectory> given = std::nullopt) {
     Drive drive;
     const auto& c = options.intrinsics;
     drive.camera = {c.fx_px, c.fy_px, c.cx_px, c.cy_px, 0.05};
@@ -33,7 +37,7 @@ struct Drive {
     options.scans = false;
     options.truth_rate_hz = 1.0;
     options.imu_rate_hz = 1.0;
-    simulation::Simulator simulator(options, 2);
+    simulation::Simulator simulator(options, 2, std::move(given));
     const features::Undistorter undistorter{sensors::CameraModel(c)};
     features::FeatureExtractor extractor({});
     while (const auto event = simulator.next()) {

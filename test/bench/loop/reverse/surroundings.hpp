@@ -1,0 +1,43 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+#include <vector>
+
+#include "camvox/geometry/se3.hpp"
+
+namespace camvox::bench {
+
+/// Tuning of gather().
+struct SurroundingsConfig {
+  double reach_m = 25.0;      ///< Path before and after a place that is looked around from.
+  double max_range_m = 20.0;  ///< Surfaces farther from the place are left out.
+  double max_height_m = 6.0;  ///< The same, above the camera.
+  double grain_m = 0.3;       ///< One point stands for all that fall in a cube of this size.
+};
+
+/// Points on surfaces that were measured from one pose.
+struct SurfaceView {
+  std::span<const Eigen::Vector3f> points_camera;
+  geometry::SE3 T_place_camera;
+};
+
+/// What stands around a place, from all sides from which it was passed. The level frame has its
+/// origin in the place's camera, z up, x to where the camera looks.
+struct Surroundings {
+  geometry::SE3 T_place_level;
+  std::vector<Eigen::Vector3f> points_level;
+};
+
+/// Puts together what was seen from poses along the path past a place; the place's own view is
+/// `views[centre]`, the others stand in the order of the path. Up is perpendicular to the path, and
+/// otherwise where the cameras' tops point to on average.
+[[nodiscard]] Surroundings gather(std::span<const SurfaceView> views,
+                                  std::size_t centre,
+                                  const SurroundingsConfig& config);
+
+/// One mean point for each occupied cube of a grid, in the order of the cubes.
+[[nodiscard]] std::vector<Eigen::Vector3f> thin(std::span<const Eigen::Vector3f> points,
+                                                double grain_m);
+
+}  // namespace camvox::bench
