@@ -59,17 +59,39 @@ std::vector<std::uint32_t> unflagged(const BundleProblem& problem) {
   return list;
 }
 
-double robust_cost(const BundleProblem& problem,
-                   const std::vector<std::uint32_t>& counted,
-                   const BundleAdjustmentConfig& config) {
-  double sum = 0.0;
-  for (const auto i : counted) {
-    const auto residual = residual_of(problem, problem.observations[i]);
+struct ObservationCost {
+  double pixel = 0.0;
+  double depth = 0.0;
+};
+
+/// Robust, of the listed observations, in their order.
+std::vector<ObservationCost> costs_of(const BundleProblem& problem,
+                                      const std::vector<std::uint32_t>& counted,
+                                      const BundleAdjustmentConfig& config) {
+  std::vector<ObservationCost> costs(counted.size());
+  for (std::size_t k = 0; k < counted.size(); ++k) {
+    const auto residual = residual_of(problem, problem.observations[counted[k]]);
     if (!residual) continue;  // moved behind the camera: an outlier, of no defined cost
-    sum += internal::huber(residual->r.head<2>().squaredNorm(), config.pixel_gate).value;
-    sum += internal::huber(residual->r[2] * residual->r[2], config.depth_gate).value;
+    costs[k].pixel =
+        0.5 * internal::huber(residual->r.head<2>().squaredNorm(), config.pixel_gate).value;
+    costs[k].depth =
+        0.5 * internal::huber(residual->r[2] * residual->r[2], config.depth_gate).value;
   }
-  return 0.5 * sum;
+  return costs;
+}
+
+/// Over what is no outlier now: a few gross ones would outweigh all that was adjusted.
+double kept_cost(const BundleProblem& problem,
+                 const std::vector<std::uint32_t>& counted,
+                 const std::vector<ObservationCost>& costs) {
+  double sum = 0.0;
+  for (std::size_t k = 0; k < counted.size(); ++k) {
+    const BundleObservation& observation = problem.observations[counted[k]];
+    if (observation.outlier) continue;
+    sum += costs[k].pixel;
+    if (!observation.depth_outlier) sum += costs[k].depth;
+  }
+  return sum;
 }
 
 bool is_set(const std::atomic<bool>* stop) {
@@ -94,7 +116,7 @@ BundleSummary adjust(BundleProblem& problem,
   const auto judged = unflagged(problem);
   if (summary.free_poses == 0 || judged.empty()) return summary;
 
-  summary.cost_before = robust_cost(problem, judged, config);
+  const auto costs_before = costs_of(problem, judged, config);
   internal::BundleSolver first(problem, config);
   summary.iterations = first.run(config.first_iterations, stop);
   gate(problem, judged, config);
@@ -103,7 +125,8 @@ BundleSummary adjust(BundleProblem& problem,
     summary.iterations += second.run(config.second_iterations, stop);
     gate(problem, judged, config);
   }
-  summary.cost_after = robust_cost(problem, judged, config);
+  summary.cost_before = kept_cost(problem, judged, costs_before);
+  summary.cost_after = kept_cost(problem, judged, costs_of(problem, judged, config));
   for (const auto& observation : problem.observations) {
     if (observation.outlier) ++summary.outliers;
     if (observation.depth_outlier) ++summary.depth_outliers;

@@ -71,7 +71,7 @@ struct BundleSummary {
   std::size_t observations = 0;
   std::size_t outliers = 0;        ///< Observations flagged in the end.
   std::size_t depth_outliers = 0;  ///< Depths flagged in the end, their pixels being good.
-  double cost_before = 0.0;  ///< Half the robustified squared error, incoming outliers left out.
+  double cost_before = 0.0;  ///< Half the robustified squared error of what is no outlier after.
   double cost_after = 0.0;   ///< The same over the same observations.
 
   /// One line: cost before and after, iterations, sizes, and the time that the caller measured.
