@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "camvox/calibration/overlay.hpp"
+#include "camvox/component/background_thread.hpp"
 
 namespace camvox::calibration_component {
 namespace {
@@ -48,6 +49,7 @@ void CalibrationJob::start(CalibrationTask task, Done done) {
   if (busy_.exchange(true)) throw std::logic_error("CalibrationJob: a calibration is under way");
   thread_ = std::jthread(
       [this, task = std::move(task), done = std::move(done)](const std::stop_token& stop) {
+        make_background_thread();
         const auto result = perform(task, stop);
         busy_ = false;  // before `done` tells, so that who is told may start the next
         done(result);

@@ -3,6 +3,8 @@
 #include <exception>
 #include <utility>
 
+#include "camvox/component/background_thread.hpp"
+
 namespace camvox::loop_closing {
 
 Worker::Worker(std::function<void(std::exception_ptr)> on_error)
@@ -31,6 +33,7 @@ std::size_t Worker::busy() const {
 }
 
 void Worker::run() {
+  make_background_thread();
   std::unique_lock lock(mutex_);
   while (true) {
     wake_.wait(lock, [this] { return ending_ || !tasks_.empty(); });

@@ -3,6 +3,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "camvox/component/background_thread.hpp"
 #include "camvox/component/progress.hpp"
 
 namespace camvox::mapping_component {
@@ -30,6 +31,7 @@ void JobRunner::start(mapping::BundleJob job) {
 }
 
 void JobRunner::run() {
+  make_background_thread();
   std::unique_lock lock(mutex_);
   while (true) {
     changed_.wait(lock, [this] { return ending_ || job_.has_value(); });
