@@ -5,27 +5,14 @@
 #include <utility>
 
 #include "camvox/calibration_component/rig_file.hpp"
-#include "camvox/conversion/image.hpp"
 #include "camvox/conversion/pose.hpp"
 
 namespace camvox {
 namespace {
 
-constexpr std::size_t kMaxPoints = 2'000'000;
 /// Frames of which one half waits for the other: as many as a lockstep replay has under way.
 constexpr std::size_t kFramesKept = 8;
 constexpr std::string_view kRequestTopic = "/camvox/calibrate";
-
-cv::Mat copy_of(const camvox_interfaces::msg::FrameImage& image) {
-  cv::Mat copy(static_cast<int>(image.height_px()), static_cast<int>(image.width_px()), CV_8UC3);
-  for (int row = 0; row < copy.rows; ++row) {
-    for (int column = 0; column < copy.cols; ++column) {
-      const auto bgr = conversion::bgr_at(image, column, row);
-      copy.at<cv::Vec3b>(row, column) = {bgr[0], bgr[1], bgr[2]};
-    }
-  }
-  return copy;
-}
 
 }  // namespace
 
@@ -95,19 +82,9 @@ void CalibrationComponent::add(const FrameImage& image, const Cloud& cloud) {
   const auto stamp_ns = cloud.header().stamp_ns();
   const bool standing = cloud.stationary() != 0;
   if (!standing) done_here_ = false;
-  if (!standing || !wanted(stamp_ns)) {
-    first_ns_.reset();
-    scene_ = {};
-    return;
-  }
-  if (!first_ns_) first_ns_ = stamp_ns;
-  if (scene_.image.empty() && conversion::is_well_formed(image)) scene_.image = copy_of(image);
-  for (std::uint32_t i = 0; i < cloud.points_count(); ++i) {
-    if (scene_.points_lidar.size() >= kMaxPoints) break;
-    scene_.points_lidar.emplace_back(cloud.points()[i].data());
-  }
-  const auto collected_s = 1e-9 * static_cast<double>(stamp_ns - *first_ns_);
-  if (collected_s >= config_.collect_s && !scene_.image.empty()) calibrate(cloud.header());
+  if (!standing || !wanted(stamp_ns)) return scene_.clear();
+  scene_.add(image, cloud);
+  if (scene_.is_complete(config_.collect_s)) calibrate(cloud.header());
 }
 
 void CalibrationComponent::cancel() {
@@ -123,12 +100,8 @@ void CalibrationComponent::calibrate(const camvox_interfaces::msg::MessageHeader
   header_ = header;
   last_run_ns_ = header.stamp_ns();
   done_here_ = true;
-  first_ns_.reset();
-  calibration_component::CalibrationTask task{std::exchange(scene_, {}),
-                                              config_.camera,
-                                              T_camera_lidar_,
-                                              config_.calibration,
-                                              config_.output_dir};
+  calibration_component::CalibrationTask task{
+      scene_.take(), config_.camera, T_camera_lidar_, config_.calibration, config_.output_dir};
   if (config_.lockstep) return finish(++run_, calibration_component::perform(task));
   job_.start(std::move(task), [this, run = ++run_](const calibration::CalibrationResult& result) {
     context_.post([this, run, result] { finish(run, result); });

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "camvox/calibration_component/calibration_job.hpp"
+#include "camvox/calibration_component/scene_collector.hpp"
 #include "camvox/component/component.hpp"
 #include "camvox/component/progress.hpp"
 #include "camvox/interfaces/camvox_interfaces.hpp"
@@ -87,9 +88,8 @@ class CalibrationComponent final : public Component {
   bool done_here_ = false;  ///< This standstill has had its calibration.
   std::map<std::uint64_t, Sample<FrameImage>> images_;
   std::map<std::uint64_t, Sample<Cloud>> clouds_;
-  std::optional<std::int64_t> first_ns_;
   std::optional<std::int64_t> last_run_ns_;
-  calibration::Scene scene_;
+  calibration_component::SceneCollector scene_;
   camvox_interfaces::msg::MessageHeader header_;
   std::uint64_t run_ = 0;  ///< Raised by each start and each cancellation.
   std::uint64_t accepted_ = 0;
