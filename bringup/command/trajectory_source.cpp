@@ -8,6 +8,7 @@
 
 #include "bag_message.hpp"
 #include "camvox/interfaces/geometry_msgs.hpp"
+#include "camvox/interfaces/header.hpp"
 #include "camvox/interfaces/nav_msgs.hpp"
 #include "camvox/interfaces/sensor_msgs.hpp"
 #include "camvox/storage/bag_reader.hpp"
@@ -52,11 +53,6 @@ const storage::BagTopic& choose_topic(const storage::BagReader& bag, const std::
   return truth != found.end() ? **truth : *found.front();
 }
 
-template <typename Header>
-std::int64_t stamp_of(const Header& header) {
-  return header.stamp().sec() * std::int64_t{1'000'000'000} + header.stamp().nanosec();
-}
-
 template <typename Pose>
 geometry::SE3 to_se3(const Pose& pose) {
   const auto& p = pose.position();
@@ -73,13 +69,14 @@ trajectory::Trajectory read_topic(const storage::BagReader& bag, const storage::
   while (const auto* raw = cursor.next()) {
     if (topic.type == kTypes[0]) {
       const auto message = decode<nav_msgs::msg::Odometry>(*raw, topic.name);
-      poses.push_back({stamp_of(message.header()), to_se3(message.pose().pose())});
+      poses.push_back({interfaces::stamp_of(message.header()), to_se3(message.pose().pose())});
     } else if (topic.type == kTypes[1]) {
       const auto message = decode<geometry_msgs::msg::PoseStamped>(*raw, topic.name);
-      poses.push_back({stamp_of(message.header()), to_se3(message.pose())});
+      poses.push_back({interfaces::stamp_of(message.header()), to_se3(message.pose())});
     } else {
       const auto fix = decode<sensor_msgs::msg::NavSatFix>(*raw, topic.name);
-      fixes.push_back({stamp_of(fix.header()), fix.latitude(), fix.longitude(), fix.altitude()});
+      fixes.push_back(
+          {interfaces::stamp_of(fix.header()), fix.latitude(), fix.longitude(), fix.altitude()});
     }
   }
   if (!cursor.status().ok()) throw CommandError(cursor.status().message());

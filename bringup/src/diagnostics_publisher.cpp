@@ -1,5 +1,7 @@
 #include "diagnostics_publisher.hpp"
 
+#include "camvox/interfaces/header.hpp"
+
 namespace camvox::bringup {
 namespace {
 
@@ -31,9 +33,7 @@ DiagnosticsPublisher::DiagnosticsPublisher(Context& context, std::string contain
 
 void DiagnosticsPublisher::publish(const std::vector<Entry>& entries) {
   auto message = publisher_.loan();
-  const std::int64_t now_ns = context_.now_ns();
-  message->header().stamp().sec(static_cast<std::int32_t>(now_ns / 1'000'000'000));
-  message->header().stamp().nanosec(static_cast<std::uint32_t>(now_ns % 1'000'000'000));
+  message->header(interfaces::to_header(context_.now_ns(), ""));
   for (const auto& entry : entries) message->status().push_back(to_message(entry, container_));
   publisher_.publish(std::move(message));
 }

@@ -5,10 +5,10 @@
 #include <filesystem>
 #include <stdexcept>
 
-#include "camvox/conversion/header.hpp"
 #include "camvox/conversion/image.hpp"
 #include "camvox/conversion/point_cloud.hpp"
 #include "camvox/conversion/pose.hpp"
+#include "camvox/interfaces/header.hpp"
 #include "cloud_file.hpp"
 
 namespace camvox {
@@ -135,7 +135,7 @@ void DenseMapComponent::on_update(const MapUpdate& update) {
 void DenseMapComponent::publish() {
   if (cloud_.subscriber_count() == 0 || map_.size() == 0) return;
   auto cloud = cloud_.loan();
-  cloud->header(conversion::to_header(context_.now_ns(), "map"));
+  cloud->header(interfaces::to_header(context_.now_ns(), "map"));
   conversion::write_points(map_.points(), *cloud);
   cloud_.publish(std::move(cloud));
 }

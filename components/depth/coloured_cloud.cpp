@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "camvox/conversion/header.hpp"
 #include "camvox/conversion/image.hpp"
 #include "camvox/conversion/point_cloud.hpp"
+#include "camvox/interfaces/header.hpp"
 #include "edge_images.hpp"
 
 namespace camvox::depth_component {
@@ -84,7 +84,7 @@ void ColouredCloudOutput::publish_if_complete(std::uint64_t frame_id) {
       points.push_back({seen.p_camera, {bgr[2], bgr[1], bgr[0]}});
     }
     auto message = clouds_.loan();
-    message->header(conversion::to_header(cloud->second.stamp_ns, kCameraFrame));
+    message->header(interfaces::to_header(cloud->second.stamp_ns, kCameraFrame));
     conversion::write_points(points, *message);
     clouds_.publish(std::move(message));
   }

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "camvox/conversion/header.hpp"
+#include "camvox/interfaces/header.hpp"
 
 namespace camvox::depth_component {
 namespace {
@@ -14,7 +14,7 @@ using sensor_msgs::msg::Image;
 constexpr float kMaxMillimetres = 65535.0F;
 
 std_msgs::msg::Header header_of(const DepthImage& depth) {
-  return conversion::to_header(depth.header().stamp_ns(), kCameraFrame);
+  return interfaces::to_header(depth.header().stamp_ns(), kCameraFrame);
 }
 
 /// Everything but the pixels; those are `bytes` each, all zero.

@@ -1,5 +1,6 @@
 #include "camvox/component/component.hpp"
 #include "camvox/interfaces/camvox_interfaces.hpp"
+#include "camvox/interfaces/header.hpp"
 #include "camvox/interfaces/sensor_msgs.hpp"
 
 using camvox_interfaces::msg::FrameImage;
@@ -27,10 +28,7 @@ class ThumbnailComponent final : public camvox::Component {
   void publish_thumbnail(const FrameImage& frame) {  // `frame` is the writer's memory: no copy
     if (frame.encoding() != camvox_interfaces::msg::ENCODING_MONO8) return;
     auto thumbnail = publisher_.loan();
-    thumbnail->header().stamp().sec(
-        static_cast<std::int32_t>(frame.header().stamp_ns() / 1000000000));
-    thumbnail->header().stamp().nanosec(
-        static_cast<std::uint32_t>(frame.header().stamp_ns() % 1000000000));
+    thumbnail->header(camvox::interfaces::to_header(frame.header().stamp_ns(), "camera"));
     thumbnail->encoding("mono8");
     thumbnail->width((frame.width_px() + step_px_ - 1) / step_px_);
     thumbnail->height((frame.height_px() + step_px_ - 1) / step_px_);

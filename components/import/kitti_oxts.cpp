@@ -62,7 +62,7 @@ OxtsSample read_oxts(const std::filesystem::path& path) {
 
 sensor_msgs::msg::Imu to_imu(std::int64_t stamp_ns, const OxtsSample& sample) {
   sensor_msgs::msg::Imu message;
-  message.header(make_header(stamp_ns, kImuFrame));
+  message.header(interfaces::to_header(stamp_ns, kImuFrame));
   message.orientation(to_message(sample.q_enu_imu));
   message.angular_velocity(to_message(sample.rate_imu_radps));
   message.linear_acceleration(to_message(sample.acceleration_imu_mps2));
@@ -75,7 +75,7 @@ sensor_msgs::msg::NavSatFix to_fix(std::int64_t stamp_ns, const OxtsSample& samp
   constexpr std::uint16_t kGps = 1;
   constexpr std::uint8_t kApproximated = 1;
   sensor_msgs::msg::NavSatFix message;
-  message.header(make_header(stamp_ns, kImuFrame));
+  message.header(interfaces::to_header(stamp_ns, kImuFrame));
   message.status().status(sample.position_mode >= kFirstCorrectedMode ? kGroundAugmented
                           : sample.position_mode >= kFirstMode        ? kFix
                                                                       : kNoFix);

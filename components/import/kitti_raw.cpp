@@ -35,7 +35,7 @@ sensor_msgs::msg::PointCloud2 make_cloud(std::int64_t stamp_ns,
   const std::size_t count = bytes.size() / kStored;
   const std::size_t step = kStored + (sweep ? sizeof(float) : 0);
   sensor_msgs::msg::PointCloud2 cloud;
-  cloud.header(make_header(stamp_ns, kLidarFrame));
+  cloud.header(interfaces::to_header(stamp_ns, kLidarFrame));
   cloud.height(1);
   cloud.width(static_cast<std::uint32_t>(count));
   for (const auto* name : {"x", "y", "z", "intensity", "time"}) {

@@ -150,7 +150,7 @@ class LivoxCsvImport {
     const auto stamp_ns = options_.start_ns + timebase_ns_;
     const auto end_ns = stamp_ns + points_.back().offset_time();
     CustomMsg message;
-    message.header(make_header(stamp_ns, kLivoxFrame));
+    message.header(interfaces::to_header(stamp_ns, kLivoxFrame));
     message.timebase(static_cast<std::uint64_t>(stamp_ns));
     message.point_num(static_cast<std::uint32_t>(points_.size()));
     message.points(std::move(points_));

@@ -7,20 +7,11 @@ namespace camvox::import {
 
 static_assert(std::endian::native == std::endian::little, "image data are stored little-endian");
 
-std_msgs::msg::Header make_header(std::int64_t stamp_ns, const std::string& frame) {
-  constexpr std::int64_t kSecond_ns = 1'000'000'000;
-  std_msgs::msg::Header header;
-  header.stamp().sec(static_cast<std::int32_t>(stamp_ns / kSecond_ns));
-  header.stamp().nanosec(static_cast<std::uint32_t>(stamp_ns % kSecond_ns));
-  header.frame_id(frame);
-  return header;
-}
-
 sensor_msgs::msg::CompressedImage make_compressed_image(std::int64_t stamp_ns,
                                                         const std::string& format,
                                                         std::vector<std::uint8_t> bytes) {
   sensor_msgs::msg::CompressedImage message;
-  message.header(make_header(stamp_ns, kCameraFrame));
+  message.header(interfaces::to_header(stamp_ns, kCameraFrame));
   message.format(format);
   message.data(std::move(bytes));
   return message;
@@ -31,7 +22,7 @@ sensor_msgs::msg::Image make_depth_image(std::int64_t stamp_ns,
                                          int height_px,
                                          std::span<const std::uint16_t> depth_mm) {
   sensor_msgs::msg::Image message;
-  message.header(make_header(stamp_ns, kCameraFrame));
+  message.header(interfaces::to_header(stamp_ns, kCameraFrame));
   message.width(static_cast<std::uint32_t>(width_px));
   message.height(static_cast<std::uint32_t>(height_px));
   message.encoding("16UC1");
@@ -44,7 +35,7 @@ sensor_msgs::msg::Image make_depth_image(std::int64_t stamp_ns,
 sensor_msgs::msg::CameraInfo make_camera_info(std::int64_t stamp_ns, const CameraModel& camera) {
   const double fx = camera.fx_px, fy = camera.fy_px, cx = camera.cx_px, cy = camera.cy_px;
   sensor_msgs::msg::CameraInfo message;
-  message.header(make_header(stamp_ns, kCameraFrame));
+  message.header(interfaces::to_header(stamp_ns, kCameraFrame));
   message.width(static_cast<std::uint32_t>(camera.width_px));
   message.height(static_cast<std::uint32_t>(camera.height_px));
   message.distortion_model("plumb_bob");
@@ -76,7 +67,7 @@ nav_msgs::msg::Odometry make_odometry(std::int64_t stamp_ns,
                                       const std::string& child,
                                       const Eigen::Isometry3d& T_map_child) {
   nav_msgs::msg::Odometry message;
-  message.header(make_header(stamp_ns, kMapFrame));
+  message.header(interfaces::to_header(stamp_ns, kMapFrame));
   message.child_frame_id(child);
   auto& pose = message.pose().pose();
   pose.position().x(T_map_child.translation().x());
@@ -91,7 +82,7 @@ geometry_msgs::msg::TransformStamped make_transform(std::int64_t stamp_ns,
                                                     const std::string& child,
                                                     const Eigen::Isometry3d& T_parent_child) {
   geometry_msgs::msg::TransformStamped message;
-  message.header(make_header(stamp_ns, parent));
+  message.header(interfaces::to_header(stamp_ns, parent));
   message.child_frame_id(child);
   message.transform().translation(to_message(Eigen::Vector3d(T_parent_child.translation())));
   message.transform().rotation(to_message(Eigen::Quaterniond(T_parent_child.rotation())));

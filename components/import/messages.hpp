@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "camvox/interfaces/geometry_msgs.hpp"
+#include "camvox/interfaces/header.hpp"
 #include "camvox/interfaces/nav_msgs.hpp"
 #include "camvox/interfaces/sensor_msgs.hpp"
 #include "camvox/interfaces/tf2_msgs.hpp"
@@ -26,8 +27,6 @@ inline constexpr const char* kLivoxFrame = "livox_frame";  // as livox_ros_drive
 // Topics that topics.hpp has no name for: only recordings carry them.
 inline constexpr std::string_view kGroundTruthTopic = "/ground_truth/odometry";
 inline constexpr std::string_view kDepthTopic = interfaces::topics::kRegisteredDepth;
-
-[[nodiscard]] std_msgs::msg::Header make_header(std::int64_t stamp_ns, const std::string& frame);
 
 /// A JPEG or PNG as it is in its file.
 [[nodiscard]] sensor_msgs::msg::CompressedImage make_compressed_image(

@@ -19,7 +19,7 @@ sensor_msgs::msg::Image make_image(std::int64_t stamp_ns,
                                    const char* encoding,
                                    std::span<const std::byte> pixels) {
   sensor_msgs::msg::Image message;
-  message.header(make_header(stamp_ns, kCameraFrame));
+  message.header(interfaces::to_header(stamp_ns, kCameraFrame));
   message.width(static_cast<std::uint32_t>(width_px));
   message.height(static_cast<std::uint32_t>(height_px));
   message.encoding(encoding);
@@ -73,7 +73,7 @@ sensor_msgs::msg::Image to_depth_image(const simulation::SimulatedFrame& frame) 
 
 livox_ros_driver2::msg::CustomMsg to_livox(const simulation::LidarScan& scan) {
   livox_ros_driver2::msg::CustomMsg message;
-  message.header(make_header(scan.stamp_ns, kLivoxFrame));
+  message.header(interfaces::to_header(scan.stamp_ns, kLivoxFrame));
   message.timebase(static_cast<std::uint64_t>(scan.stamp_ns));
   message.point_num(static_cast<std::uint32_t>(scan.points.size()));
   message.points().reserve(scan.points.size());
@@ -94,7 +94,7 @@ livox_ros_driver2::msg::CustomMsg to_livox(const simulation::LidarScan& scan) {
 sensor_msgs::msg::PointCloud2 to_truth_points(const simulation::LidarScan& scan) {
   constexpr std::uint32_t kStep = 16;
   sensor_msgs::msg::PointCloud2 message;
-  message.header(make_header(scan.stamp_ns, kLivoxFrame));
+  message.header(interfaces::to_header(scan.stamp_ns, kLivoxFrame));
   message.height(1);
   message.width(static_cast<std::uint32_t>(scan.truth.size()));
   message.fields({float_field("x", 0),
@@ -120,7 +120,7 @@ sensor_msgs::msg::Imu to_imu(const simulation::ImuSample& sample,
                              double gyro_variance,
                              double accel_variance) {
   sensor_msgs::msg::Imu message;
-  message.header(make_header(sample.stamp_ns, kImuFrame));
+  message.header(interfaces::to_header(sample.stamp_ns, kImuFrame));
   message.angular_velocity(to_message(sample.omega_rad_s));
   message.linear_acceleration(to_message(sample.force_m_s2));
   message.orientation_covariance()[0] = -1.0;  // REP-145: no orientation
@@ -141,7 +141,7 @@ sensor_msgs::msg::NavSatFix to_fix(const simulation::GnssSample& sample) {
   constexpr std::uint16_t kGps = 1;
   constexpr std::uint8_t kDiagonalKnown = 2;
   sensor_msgs::msg::NavSatFix message;
-  message.header(make_header(sample.stamp_ns, kGnssFrame));
+  message.header(interfaces::to_header(sample.stamp_ns, kGnssFrame));
   message.status().status(kGroundAugmented);
   message.status().service(kGps);
   message.latitude(sample.fix.latitude_deg);

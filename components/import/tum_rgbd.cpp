@@ -24,7 +24,7 @@ constexpr std::array<double, 9> kUnknownKinect = {525.0, 525.0, 319.5, 239.5, 0,
 
 sensor_msgs::msg::Imu make_acceleration(const TumAcceleration& sample) {
   sensor_msgs::msg::Imu message;
-  message.header(make_header(sample.stamp_ns, kImuFrame));
+  message.header(interfaces::to_header(sample.stamp_ns, kImuFrame));
   message.linear_acceleration(to_message(sample.acceleration_mps2));
   message.orientation().w(1.0);
   message.orientation_covariance()[0] = -1.0;  // absent

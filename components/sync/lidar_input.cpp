@@ -2,12 +2,14 @@
 
 #include <algorithm>
 
+#include "camvox/interfaces/header.hpp"
+
 namespace camvox::sync_component {
 
 std::string read_livox(const livox_ros_driver2::msg::CustomMsg& message,
                        const LidarInputOptions& options,
                        sync::LidarChunk& chunk) {
-  const std::int64_t header_ns = stamp_of(message.header());
+  const std::int64_t header_ns = interfaces::stamp_of(message.header());
   const auto timebase_ns = static_cast<std::int64_t>(message.timebase());
   const bool same_clock = timebase_ns > 0 && (header_ns == 0 || std::abs(timebase_ns - header_ns) <=
                                                                     options.clock_jump_ns);

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "camvox/interfaces/header.hpp"
 #include "camvox/sync_component/lidar_input.hpp"
 
 namespace camvox::sync_component {
@@ -122,7 +123,7 @@ class Reader {
     const auto unit = time_unit(unit_name,
                                 *fields_.time,
                                 fields_.time->read(point(0)),
-                                static_cast<double>(stamp_of(cloud_.header())));
+                                static_cast<double>(interfaces::stamp_of(cloud_.header())));
     for (std::size_t i = 0; i < count; ++i) {
       times_ns_[i] = (fields_.time->read(point(i)) - unit.origin) * unit.scale;
     }
@@ -135,7 +136,7 @@ class Reader {
 
   void read_points(sync::LidarChunk& chunk) const {
     chunk.has_point_times = fields_.time.has_value();
-    chunk.stamp_ns = stamp_of(cloud_.header()) + std::llround(first_ns_);
+    chunk.stamp_ns = interfaces::stamp_of(cloud_.header()) + std::llround(first_ns_);
     chunk.end_ns = chunk.stamp_ns;
     chunk.returns.clear();
     chunk.returns.reserve(points());

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "camvox/interfaces/header.hpp"
 #include "camvox/sync_component/lidar_input.hpp"
 
 namespace camvox::sync_component {
@@ -14,7 +15,7 @@ std::optional<sync::ImuSample> read_imu(const sensor_msgs::msg::Imu& imu, lidar:
   if (!std::isfinite(norm + rate.x() + rate.y() + rate.z())) return std::nullopt;
   unit.add(norm);
   const double unit_m_s2 = unit.factor_m_s2().value_or(1.0);
-  return sync::ImuSample{stamp_of(imu.header()),
+  return sync::ImuSample{interfaces::stamp_of(imu.header()),
                          {rate.x(), rate.y(), rate.z()},
                          {unit_m_s2 * force.x(), unit_m_s2 * force.y(), unit_m_s2 * force.z()}};
 }

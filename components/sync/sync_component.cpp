@@ -5,6 +5,8 @@
 #include <chrono>
 #include <cmath>
 
+#include "camvox/interfaces/header.hpp"
+
 namespace camvox {
 namespace {
 
@@ -14,7 +16,6 @@ using sensor_msgs::msg::CompressedImage;
 using sensor_msgs::msg::Image;
 using sensor_msgs::msg::Imu;
 using sensor_msgs::msg::PointCloud2;
-using sync_component::stamp_of;
 
 // Drivers may publish best-effort; in lockstep much can wait while other components work.
 constexpr Qos kImageReader{16, false, false};
@@ -141,7 +142,7 @@ void SyncComponent::subscribe_depth_source() {
 template <typename ImageMessage>
 void SyncComponent::on_image(const ImageMessage& image) {
   const auto work = progress_.measure();
-  const std::int64_t stamp_ns = stamp_of(image.header());
+  const std::int64_t stamp_ns = interfaces::stamp_of(image.header());
   report_.image_came(seconds(context_.now_ns() - stamp_ns));
   const auto verdict = assembler_.judge_image(stamp_ns);
   if (verdict == sync::ImageVerdict::kDuplicate) return;
@@ -166,7 +167,7 @@ void SyncComponent::on_image(const ImageMessage& image) {
 
 void SyncComponent::on_depth(const Image& image) {
   const auto work = progress_.measure();
-  const std::int64_t stamp_ns = stamp_of(image.header());
+  const std::int64_t stamp_ns = interfaces::stamp_of(image.header());
   if (depth_pairing_.accepts(assembler_.lidar_time_ns(stamp_ns))) {
     auto loan = std::make_shared<Loan<DepthImage>>(depth_images_.loan());
     const auto problem = sync_component::read_depth(image, config_.camera, config_.rgbd, **loan);

@@ -1,13 +1,13 @@
 #include "camvox/tracking_component/odometry_output.hpp"
 
-#include "camvox/conversion/header.hpp"
 #include "camvox/conversion/pose.hpp"
+#include "camvox/interfaces/header.hpp"
 
 namespace camvox::tracking_component {
 namespace {
 
-using conversion::to_header;
 using geometry::SE3;
+using interfaces::to_header;
 
 constexpr std::size_t kMaxPathPoses = 4000;  // then every second goes
 constexpr double kPathStep_m = 0.1;

@@ -8,6 +8,7 @@
 #include "camvox/conversion/pose.hpp"
 #include "camvox/deskew_component/deskew_component.hpp"
 #include "camvox/import/kitti_raw.hpp"
+#include "camvox/interfaces/header.hpp"
 #include "camvox/interfaces/nav_msgs.hpp"
 #include "camvox/interfaces/tf2_msgs.hpp"
 #include "camvox/storage/bag_reader.hpp"
@@ -73,8 +74,8 @@ class KittiDrive : public ::testing::Test {
       if (topic == "/ground_truth/odometry") {
         const auto odometry = read<nav_msgs::msg::Odometry>(*logged);
         const auto& pose = odometry.pose().pose();
-        truth_.push_back({sync_component::stamp_of(odometry.header()),
-                          to_se3(pose.position(), pose.orientation())});
+        truth_.push_back(
+            {interfaces::stamp_of(odometry.header()), to_se3(pose.position(), pose.orientation())});
       } else if (topic == topics::kStaticTransforms) {
         for (const auto& given : read<tf2_msgs::msg::TFMessage>(*logged).transforms()) {
           const auto T = to_se3(given.transform().translation(), given.transform().rotation());

@@ -10,12 +10,6 @@
 
 namespace camvox::sync_component {
 
-/// Nanoseconds of a message's header.
-template <typename Header>
-[[nodiscard]] std::int64_t stamp_of(const Header& header) {
-  return std::int64_t{1'000'000'000} * header.stamp().sec() + header.stamp().nanosec();
-}
-
 /// How lidar messages are read.
 struct LidarInputOptions {
   lidar::NoiseConfidence noise = lidar::NoiseConfidence::kModerate;

@@ -5,12 +5,14 @@
 
 #include "camvox/interfaces/std_msgs.hpp"
 
-namespace camvox::conversion {
+/// Between the header of ROS messages and our stamps, ns since the epoch.
+namespace camvox::interfaces {
 
-/// A ROS header of a moment, ns since the epoch, in a frame.
+inline constexpr std::int64_t kSecond_ns = 1'000'000'000;
+
+/// A ROS header of a moment at or after the epoch, in a frame.
 [[nodiscard]] inline std_msgs::msg::Header to_header(std::int64_t stamp_ns,
                                                      const std::string& frame) {
-  constexpr std::int64_t kSecond_ns = 1'000'000'000;
   std_msgs::msg::Header header;
   header.stamp().sec(static_cast<std::int32_t>(stamp_ns / kSecond_ns));
   header.stamp().nanosec(static_cast<std::uint32_t>(stamp_ns % kSecond_ns));
@@ -18,4 +20,9 @@ namespace camvox::conversion {
   return header;
 }
 
-}  // namespace camvox::conversion
+/// Nanoseconds of a message's header.
+[[nodiscard]] inline std::int64_t stamp_of(const std_msgs::msg::Header& header) {
+  return kSecond_ns * header.stamp().sec() + header.stamp().nanosec();
+}
+
+}  // namespace camvox::interfaces
