@@ -5,10 +5,10 @@
 #include <cmath>
 
 #include "bag.hpp"
-#include "bag_context.hpp"
 #include "camvox/bringup/parameter_file.hpp"
 #include "camvox/recording/replay_component.hpp"
 #include "keyboard.hpp"
+#include "single_component.hpp"
 
 namespace camvox::command {
 namespace {

@@ -5,8 +5,8 @@
 #include <ctime>
 
 #include "bag.hpp"
-#include "bag_context.hpp"
 #include "camvox/recording/record_component.hpp"
+#include "single_component.hpp"
 
 namespace camvox::command {
 namespace {

@@ -6,9 +6,9 @@
 namespace camvox::command {
 namespace {
 
-TopicInfo find_topic(const Session& session, const std::string& name) {
+dds::TopicEndpoints find_topic(const Session& session, const std::string& name) {
   require_topic_name(name);
-  for (auto& topic : topics_of(session.settled())) {
+  for (auto& topic : dds::topics_of(session.settled())) {
     if (topic.name == name) return topic;
   }
   throw CommandError(
@@ -33,7 +33,7 @@ void print_endpoint(const dds::DiscoveredEndpoint& endpoint, const std::string& 
 
 int topic_list(const CommonOptions& common, const TopicOptions& options) {
   const Session session(common);
-  auto topics = topics_of(session.settled());
+  auto topics = dds::topics_of(session.settled());
   if (!options.hidden) {
     std::erase_if(topics,
                   [](const auto& topic) { return topic.name.find("/_") != std::string::npos; });

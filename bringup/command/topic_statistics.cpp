@@ -23,7 +23,7 @@ std::int64_t wall_now_ns() {
 template <typename OnMessage, typename Print>
 int measure(const TopicOptions& options,
             const Session& session,
-            const TopicInfo& topic,
+            const dds::TopicEndpoints& topic,
             OnMessage on_message,
             Print print) {
   int messages = 0;
@@ -68,7 +68,7 @@ std::string human_size(double bytes) {
 }
 
 /// header.stamp of either kind: of ROS 2 messages, and of our internal ones.
-std::int64_t stamp_ns(const storage::CdrValue& message, const TopicInfo& topic) {
+std::int64_t stamp_ns(const storage::CdrValue& message, const dds::TopicEndpoints& topic) {
   if (const auto stamp = storage::header_stamp_ns(message)) return *stamp;
   const auto internal = message.at("header.stamp_ns");
   if (internal && internal->as_integer()) return *internal->as_integer();

@@ -1,5 +1,6 @@
 #include "camvox/dds/component_context.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <future>
 
@@ -40,23 +41,37 @@ Middleware make_middleware(const ParticipantOptions& options,
   return middleware;
 }
 
-std::vector<TopicDescription> describe_topics(const std::vector<DiscoveredEndpoint>& endpoints) {
+std::vector<TopicEndpoints> topics_of(const std::vector<DiscoveredEndpoint>& endpoints) {
   static constexpr std::string_view kRosPrefix = "rt/";
-  std::map<std::string, TopicDescription> topics;
+  std::map<std::string, TopicEndpoints> topics;
   for (const auto& endpoint : endpoints) {
     if (!endpoint.topic_name.starts_with(kRosPrefix)) continue;
     const std::string name = endpoint.topic_name.substr(kRosPrefix.size() - 1);
     auto& topic = topics[name];
     topic.name = name;
     topic.type_name = interfaces::to_ros_type_name(endpoint.type_name);
-    ++(endpoint.is_writer ? topic.publishers : topic.subscribers);
-    if (!endpoint.is_writer) continue;
-    topic.offered.reliable = topic.offered.reliable && endpoint.reliable;
-    topic.offered.latched = topic.offered.latched || endpoint.latched;
+    (endpoint.is_writer ? topic.publishers : topic.subscribers).push_back(endpoint);
   }
-  std::vector<TopicDescription> sorted;
+  std::vector<TopicEndpoints> sorted;
   for (auto& [name, topic] : topics) sorted.push_back(std::move(topic));
   return sorted;
+}
+
+TopicDescription describe(const TopicEndpoints& topic) {
+  const auto all_offer = [&topic](bool DiscoveredEndpoint::*policy) {
+    return std::all_of(topic.publishers.begin(),
+                       topic.publishers.end(),
+                       [policy](const auto& publisher) { return publisher.*policy; });
+  };
+  TopicDescription description;
+  description.name = topic.name;
+  description.type_name = topic.type_name;
+  description.publishers = topic.publishers.size();
+  description.subscribers = topic.subscribers.size();
+  description.offered.reliable = all_offer(&DiscoveredEndpoint::reliable);
+  description.offered.latched =
+      !topic.publishers.empty() && all_offer(&DiscoveredEndpoint::latched);
+  return description;
 }
 
 ComponentContext::ComponentContext(ComponentSettings settings,
@@ -110,7 +125,9 @@ std::vector<TopicDescription> ComponentContext::topics() const {
   for (auto& endpoint : middleware_.participant->discovered_endpoints()) {
     endpoints.push_back(std::move(endpoint));
   }
-  return describe_topics(endpoints);
+  std::vector<TopicDescription> described;
+  for (const auto& topic : topics_of(endpoints)) described.push_back(describe(topic));
+  return described;
 }
 
 void ComponentContext::every(std::chrono::nanoseconds period, std::function<void()> callback) {

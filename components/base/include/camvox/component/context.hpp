@@ -76,7 +76,7 @@ struct RawMessage {
 struct TopicDescription {
   std::string name;       ///< ROS name, "/livox/lidar".
   std::string type_name;  ///< ROS name, "sensor_msgs/msg/PointCloud2".
-  Qos offered;            ///< Of its publishers: the weakest reliability, the strongest durability.
+  Qos offered;            ///< What all of its publishers offer, so that a reader gets from each.
   std::size_t publishers = 0;
   std::size_t subscribers = 0;
 };

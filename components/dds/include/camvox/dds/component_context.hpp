@@ -41,9 +41,18 @@ struct ComponentSettings {
   std::map<std::string, std::string, std::less<>> remap;  ///< Port name -> topic name.
 };
 
+/// A ROS topic, and who publishes and reads it.
+struct TopicEndpoints {
+  std::string name;       ///< "/tf"
+  std::string type_name;  ///< "tf2_msgs/msg/TFMessage"
+  std::vector<DiscoveredEndpoint> publishers;
+  std::vector<DiscoveredEndpoint> subscribers;
+};
+
 /// The ROS-visible topics among the endpoints, sorted by name.
-[[nodiscard]] std::vector<TopicDescription> describe_topics(
+[[nodiscard]] std::vector<TopicEndpoints> topics_of(
     const std::vector<DiscoveredEndpoint>& endpoints);
+[[nodiscard]] TopicDescription describe(const TopicEndpoints& topic);
 
 /// Counters of one subscription of a component, for diagnostics and `topic info`.
 struct PortStats {

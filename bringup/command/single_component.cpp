@@ -1,4 +1,4 @@
-#include "bag_context.hpp"
+#include "single_component.hpp"
 
 namespace camvox::command {
 namespace {

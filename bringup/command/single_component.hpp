@@ -10,8 +10,8 @@
 
 namespace camvox::command {
 
-/// One component on a participant and a thread of its own, for commands that are a component with
-/// a keyboard. An exception that leaves a callback ends the wait and is thrown by `finish`.
+/// One component on a participant and a thread of its own, for commands that publish or read topics
+/// until Ctrl-C. An exception that leaves a callback ends the wait and is thrown by `finish`.
 class SingleComponent {
  public:
   SingleComponent(const Session& session,
