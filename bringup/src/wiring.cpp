@@ -161,6 +161,8 @@ ProbedSystem probe_system(SystemConfig& config, PluginLoader& plugins) {
     system.problems.insert(system.problems.end(), unused.begin(), unused.end());
     const auto wiring = check_wiring(config, system.components);
     system.problems.insert(system.problems.end(), wiring.begin(), wiring.end());
+    const auto lockstep = check_lockstep(config, system.components);
+    system.problems.insert(system.problems.end(), lockstep.begin(), lockstep.end());
   }
   sort_problems(system.problems);
   return system;

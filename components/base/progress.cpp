@@ -13,10 +13,9 @@ double thread_processor_time_s() {
   return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
-ProgressReporter::ProgressReporter(Context& context)
+ProgressReporter::ProgressReporter(Context& context, const Port& port)
     : name_(context.name()),
-      publisher_(
-          context.advertise<Progress>({"progress", topics::kProgress}, {.qos = qos::kKeyframes})) {}
+      publisher_(context.advertise<Progress>(port, {.qos = qos::kKeyframes})) {}
 
 void ProgressReporter::resume() {
   if (depth_++ == 0) resumed_at_s_ = thread_processor_time_s();

@@ -37,7 +37,7 @@ LoopClosingComponent::LoopClosingComponent(Context& context)
           config_.camera.fx_px, config_.camera.fy_px, config_.camera.cx_px, config_.camera.cy_px},
       closer_(config_.loop),
       order_(config_.lockstep ? kPatienceLockstep : kPatience),
-      progress_(context),
+      progress_(context, ProgressReporter::kKeyframes),
       corrections_(context.advertise<LoopCorrection>({"loop_correction", topics::kLoopCorrection},
                                                      {.qos = qos::kKeyframes})),
       answers_(context.advertise<RelocalisationAnswer>(

@@ -133,6 +133,45 @@ TEST(Probe, ThrowingConstructorsAreReportedWhateverTheyThrow) {
                           "type that is not derived from std::exception"));
 }
 
+const std::string kReporters =
+    "  - {plugin: test::FrameReporter, name: tracking}\n"
+    "  - {plugin: test::KeyframeReporter, name: loop_closing}\n" +
+    kPoseSource;
+
+std::string lockstep_replay(const std::string& components) {
+  return "  - {plugin: test::LockstepReplay, name: replay,\n"
+         "     parameters: {lockstep: true, lockstep_components: " +
+         components + "}}\n";
+}
+
+TEST(Probe, LockstepWaitsForWhoReportsEachFrame) {
+  EXPECT_THAT(problems_of(kReporters + lockstep_replay("[tracking]")), IsEmpty());
+}
+
+TEST(Probe, LockstepThatWouldWaitForEverIsAnError) {
+  EXPECT_THAT(
+      problems_of(kReporters + lockstep_replay("[trackin, tracking, loop_closing, source]")),
+      ElementsAre(
+          "rig.yaml:6: replay.parameters.lockstep_components: 'trackin' is no component here (did "
+          "you mean 'tracking'?), and /camvox/progress is not in container.external_topics",
+          HasSubstr("'loop_closing' reports keyframes only, so that the replay would wait for "
+                    "ever; leave it out"),
+          HasSubstr("'source' does not report which frames are done")));
+}
+
+TEST(Probe, LockstepMayWaitForAnotherContainer) {
+  EXPECT_THAT(probe("container: {external_topics: [/camvox/progress]}\ncomponents:\n" + kReporters +
+                    lockstep_replay("[mapping]"))
+                  .problems,
+              IsEmpty());
+}
+
+TEST(Probe, WithoutLockstepNobodyIsWaitedFor) {
+  EXPECT_THAT(problems_of(kReporters + "  - {plugin: test::LockstepReplay, name: replay,\n"
+                                       "     parameters: {lockstep_components: [loop_closing]}}\n"),
+              IsEmpty());
+}
+
 TEST(Probe, PluginsThatCannotBeLoadedAreListedTogether) {
   const auto problems = problems_of(
       "  - {plugin: test::MissingLibrary, name: a}\n"

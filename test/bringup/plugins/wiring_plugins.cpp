@@ -2,6 +2,7 @@
 #include <stdexcept>
 
 #include "camvox/component/component.hpp"
+#include "camvox/component/progress.hpp"
 #include "camvox/interfaces/camvox_interfaces.hpp"
 #include "camvox/interfaces/nav_msgs.hpp"
 #include "camvox/interfaces/sensor_msgs.hpp"
@@ -67,10 +68,53 @@ class ThrowingInt : public camvox::Component {
   explicit ThrowingInt(Context&) { throw 42; }
 };
 
+/// Reports every frame.
+class FrameReporter : public camvox::Component {
+ public:
+  explicit FrameReporter(Context& context) : progress_(context) {}
+
+ private:
+  camvox::ProgressReporter progress_;
+};
+
+/// Reports keyframes.
+class KeyframeReporter : public camvox::Component {
+ public:
+  explicit KeyframeReporter(Context& context)
+      : progress_(context, camvox::ProgressReporter::kKeyframes) {}
+
+ private:
+  camvox::ProgressReporter progress_;
+};
+
+struct LockstepConfig {
+  bool lockstep = false;
+  std::vector<std::string> lockstep_components;
+
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& field) {
+    field("lockstep", self.lockstep);
+    field("lockstep_components", self.lockstep_components);
+  }
+};
+
+/// Waits for the reports of others.
+class LockstepReplay : public camvox::Component {
+ public:
+  explicit LockstepReplay(Context& context) {
+    (void)context.parameters<LockstepConfig>();
+    context.subscribe<camvox_interfaces::msg::Progress>(
+        {"progress", camvox::topics::kProgress}, [](const auto&) {}, {.required = false});
+  }
+};
+
 }  // namespace test
 
 CAMVOX_REGISTER_COMPONENT(test::PoseSource)
 CAMVOX_REGISTER_COMPONENT(test::PoseSink)
 CAMVOX_REGISTER_COMPONENT(test::OdometrySource)
+CAMVOX_REGISTER_COMPONENT(test::FrameReporter)
+CAMVOX_REGISTER_COMPONENT(test::KeyframeReporter)
+CAMVOX_REGISTER_COMPONENT(test::LockstepReplay)
 CAMVOX_REGISTER_COMPONENT(test::ThrowingConstructor)
 CAMVOX_REGISTER_COMPONENT(test::ThrowingInt)

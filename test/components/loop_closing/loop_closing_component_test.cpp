@@ -126,7 +126,7 @@ TEST_F(LoopClosingComponentTest, AnswersEveryKeyframeAndClosesTheLoop) {
     return (pose.translation() - truth(loop->query_keyframe_id() - 1).translation()).norm();
   };
   EXPECT_LT(error_m(corrected), 0.3);
-  EXPECT_EQ(fake_.published<Progress>("progress").size(), kRound + 10);
+  EXPECT_EQ(fake_.published<Progress>("keyframe_progress").size(), kRound + 10);
   fake_.verify_nothing_left();
 }
 

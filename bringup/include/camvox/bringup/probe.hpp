@@ -62,6 +62,10 @@ enum class MissingWriters { kForbidden, kAllowed };
     const std::vector<ProbedComponent>& components,
     MissingWriters missing = MissingWriters::kForbidden);
 
+/// Components that a replay in lockstep shall wait for, and that do not report each frame.
+[[nodiscard]] std::vector<Problem> check_lockstep(const SystemConfig& config,
+                                                  const std::vector<ProbedComponent>& components);
+
 /// The config as it takes effect, all defaults filled in, as a config file with the origin of
 /// each value as a comment.
 [[nodiscard]] std::string effective_config(const SystemConfig& config,

@@ -16,8 +16,12 @@ namespace camvox {
 /// Lockstep replay and the timing table of a run listen. For one thread, the component's.
 class ProgressReporter {
  public:
-  /// Advertises the port "progress".
-  explicit ProgressReporter(Context& context);
+  /// Port of a component that reports each frame, so that lockstep can wait for it.
+  static constexpr Port kFrames{"progress", topics::kProgress};
+  /// Port of one that reports keyframes only.
+  static constexpr Port kKeyframes{"keyframe_progress", topics::kProgress};
+
+  explicit ProgressReporter(Context& context, const Port& port = kFrames);
 
   /// Counts the processor time of this thread for the frame under way, until it ends or the frame
   /// is done.

@@ -1,0 +1,75 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "camvox/bringup/probe.hpp"
+#include "camvox/component/progress.hpp"
+
+namespace camvox::bringup {
+namespace {
+
+constexpr auto kKey = "lockstep_components";
+
+template <typename T>
+T value_of(const ProbedComponent& component, const std::string& key) {
+  const auto found = component.effective_parameters.find(key);
+  if (found == component.effective_parameters.end()) return {};
+  const auto* value = std::get_if<T>(&found->second.value);
+  return value != nullptr ? *value : T{};
+}
+
+const ProbedPort* find_port(const ProbedComponent& component, std::string_view name) {
+  const auto found = std::find_if(component.ports.begin(),
+                                  component.ports.end(),
+                                  [name](const auto& port) { return port.name == name; });
+  return found == component.ports.end() ? nullptr : &*found;
+}
+
+/// Why a component cannot be waited for, or "".
+std::string problem_with(const ProbedComponent& component, const std::string& progress_topic) {
+  const auto* frames = find_port(component, ProgressReporter::kFrames.name);
+  if (frames != nullptr && frames->is_output) {
+    return frames->topic == progress_topic
+               ? ""
+               : fmt::format("reports its frames on {}, not on {}", frames->topic, progress_topic);
+  }
+  if (find_port(component, ProgressReporter::kKeyframes.name) != nullptr) {
+    return "reports keyframes only, so that the replay would wait for ever; leave it out "
+           "(mapping waits for loop closing with wait_for_loop_closing)";
+  }
+  return "does not report which frames are done, so that the replay would wait for ever";
+}
+
+}  // namespace
+
+std::vector<Problem> check_lockstep(const SystemConfig& config,
+                                    const std::vector<ProbedComponent>& components) {
+  std::vector<std::string> names;
+  for (const auto& component : components) names.push_back(component.name);
+  const auto& external = config.container.external_topics;
+  std::vector<Problem> problems;
+  for (const auto& replay : components) {
+    const auto* progress = find_port(replay, ProgressReporter::kFrames.name);
+    if (progress == nullptr || !value_of<bool>(replay, "lockstep")) continue;
+    for (const auto& name : value_of<std::vector<std::string>>(replay, kKey)) {
+      const auto report = [&](const std::string& message) {
+        problems.push_back({replay.effective_parameters.at(kKey).location,
+                            replay.name + ".parameters." + kKey,
+                            "'" + name + "' " + message});
+      };
+      const auto found = std::find(names.begin(), names.end(), name) - names.begin();
+      if (found < std::ssize(names)) {
+        const auto problem = problem_with(components[found], progress->topic);
+        if (!problem.empty()) report(problem);
+      } else if (std::find(external.begin(), external.end(), progress->topic) == external.end()) {
+        const auto nearest = config::nearest_name(name, names);
+        report("is no component here" +
+               (nearest.empty() ? "" : " (did you mean '" + nearest + "'?)") + ", and " +
+               progress->topic + " is not in container.external_topics");
+      }
+    }
+  }
+  return problems;
+}
+
+}  // namespace camvox::bringup
