@@ -58,7 +58,7 @@ void ComponentSlot::construct() {
 
 void ComponentSlot::try_construct() {
   if (executor_ == nullptr) {
-    executor_ = config_.executor.empty() ? ExecutorPool::make(config_.name)
+    executor_ = config_.executor.empty() ? environment_.executors.make(config_.name)
                                          : environment_.executors.shared(config_.executor);
   }
   factory_ = environment_.plugins->factory(config_.plugin);

@@ -109,6 +109,7 @@ void Container::Implementation::start(Container& self) {
   const auto options = participant_options(config.container);
   doing("joining domain " + std::to_string(options.domain_id));
   environment.middleware = dds::make_middleware(options, topic_settings(config), *log);
+  environment.middleware.all_idle = environment.executors.idle_query();
   for (std::size_t i = 0; i < config.components.size(); ++i) {
     add(config.components[i], probed.components.at(i)).construct();
   }
@@ -123,7 +124,8 @@ void Container::Implementation::start(Container& self) {
 }
 
 void Container::Implementation::start_control(Container& self) {
-  control_executor = ExecutorPool::make("control");
+  control_executor = std::make_shared<dds::Executor>("control");
+  control_executor->start();
   control = std::make_unique<dds::ComponentContext>(
       dds::ComponentSettings{config.container.name, {}, {}},
       environment.middleware,

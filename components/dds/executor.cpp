@@ -3,6 +3,7 @@
 #include <pthread.h>
 
 #include <algorithm>
+#include <atomic>
 #include <condition_variable>
 #include <deque>
 #include <fastdds/dds/core/condition/Condition.hpp>
@@ -77,6 +78,8 @@ struct Executor::Implementation : std::enable_shared_from_this<Executor::Impleme
   std::condition_variable changed;
   bool stopping = false;
   bool running = false;
+  std::atomic<bool> waiting = false;
+  std::atomic<std::uint64_t> waits = 0;
   std::deque<Task> tasks;
   std::vector<std::shared_ptr<Source>> sources;
   std::vector<std::shared_ptr<Timer>> timers;
@@ -154,11 +157,14 @@ void Executor::Implementation::run() {
     const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(wait);
     ConditionSeq active;
     if (wait > Clock::duration::zero()) {
+      ++waits;
+      waiting = true;
       wait_set.wait(
           active,
           {static_cast<std::int32_t>(seconds.count()),
            static_cast<std::uint32_t>(
                std::chrono::duration_cast<std::chrono::nanoseconds>(wait - seconds).count())});
+      waiting = false;
     }
     wake_up.set_trigger_value(false);
     run_tasks();
@@ -233,6 +239,34 @@ std::function<void()> Executor::waker() const {
   return [state = std::weak_ptr(implementation_)] {
     if (const auto alive = state.lock()) alive->wake_up.set_trigger_value(true);
   };
+}
+
+bool Executor::idle() const {
+  auto& state = *implementation_;
+  const std::lock_guard lock(state.mutex);
+  const bool asks_itself = state.thread.get_id() == std::this_thread::get_id();
+  if (!asks_itself && (!state.waiting || state.wake_up.get_trigger_value())) return false;
+  return state.tasks.empty() &&
+         std::none_of(state.sources.begin(), state.sources.end(), [](const auto& source) {
+           return source->tenant->open() && source->condition->get_trigger_value();
+         });
+}
+
+std::uint64_t Executor::waits() const { return implementation_->waits; }
+
+bool all_idle(const std::vector<std::shared_ptr<Executor>>& executors) {
+  const auto waits = [&executors] {
+    std::uint64_t sum = 0;
+    for (const auto& executor : executors) sum += executor->waits();
+    return sum;
+  };
+  // Who was at work when another one was looked at may have given it something, but has then begun
+  // to wait since.
+  const auto before = waits();
+  return std::all_of(executors.begin(),
+                     executors.end(),
+                     [](const auto& executor) { return executor->idle(); }) &&
+         waits() == before;
 }
 
 bool Executor::remove(const std::shared_ptr<Tenant>& tenant, std::chrono::milliseconds timeout) {

@@ -218,7 +218,7 @@ void ReplayComponent::report() {
 /// Time alone says little: a busy machine may take long for the last frames.
 void ReplayComponent::exit_when_done() {
   const double silent_s = 1e-9 * static_cast<double>(context_.now_ns() - last_activity_ns_);
-  if (silent_s < config_.settle_s) return;
+  if (silent_s < config_.settle_s || !context_.all_idle()) return;
   const auto behind = gate_.behind();
   if (!behind.empty() && silent_s < kLongestSilence_s) return;
   context_.request_exit();

@@ -125,5 +125,56 @@ TEST(Executor, TellsHowLongACallbackHasRunAndThatItHangs) {
   EXPECT_EQ(self->busy_time().count(), 0);
 }
 
+TEST(Executor, IsIdleWhenNothingIsLeftToDo) {
+  GuardCondition arrived;
+  std::atomic<bool> goes_on = false;
+  Executor executor("test");
+  EXPECT_FALSE(executor.idle()) << "not even started";
+  executor.start();
+  EXPECT_TRUE(wait_until([&] { return executor.idle(); }));
+  executor.post(tenant(), [&goes_on] {
+    while (!goes_on) std::this_thread::sleep_for(1ms);
+  });
+  EXPECT_FALSE(executor.idle()) << "has work, begun or not";
+  goes_on = true;
+  EXPECT_TRUE(wait_until([&] { return executor.idle(); }));
+  const auto self = tenant();
+  executor.add_source(self, &arrived, [] { return false; });
+  arrived.set_trigger_value(true);
+  EXPECT_FALSE(executor.idle()) << "a message waits";
+  arrived.set_trigger_value(false);
+  EXPECT_TRUE(wait_until([&] { return executor.idle(); }));
+  EXPECT_TRUE(executor.remove(self, 5s));
+}
+
+TEST(Executor, AsksItselfWithoutCountingWhatAsks) {
+  Executor executor("test");
+  std::atomic<int> idle = -1;
+  std::atomic<int> with_more_to_do = -1;
+  executor.post(tenant(), [&] { with_more_to_do = executor.idle() ? 1 : 0; });
+  executor.post(tenant(), [&] { idle = executor.idle() ? 1 : 0; });
+  executor.start();
+  ASSERT_TRUE(wait_until([&] { return idle != -1; }));
+  EXPECT_EQ(with_more_to_do, 0);
+  EXPECT_EQ(idle, 1);
+}
+
+/// One piece of work goes from thread to thread: at each moment one of them has it.
+TEST(Executor, WorkThatIsHandedOnIsNeverOverlooked) {
+  constexpr int kHops = 20'000;
+  std::vector<std::shared_ptr<Executor>> executors;
+  for (const auto* name : {"a", "b", "c"}) executors.push_back(std::make_shared<Executor>(name));
+  const auto self = tenant();
+  std::atomic<int> hops = 0;
+  std::function<void()> hop = [&] {
+    const int done = ++hops;
+    if (done < kHops) executors[static_cast<std::size_t>(done) % 3]->post(self, hop);
+  };
+  executors[0]->post(self, hop);
+  for (const auto& executor : executors) executor->start();
+  while (!all_idle(executors)) std::this_thread::yield();  // ask often: the gaps are short
+  EXPECT_EQ(hops, kHops);
+}
+
 }  // namespace
 }  // namespace camvox::dds

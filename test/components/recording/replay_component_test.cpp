@@ -102,6 +102,24 @@ TEST(ReplayComponent, AsksForTheExitOnceNothingIsReportedDoneAnyMore) {
   EXPECT_TRUE(fake.exit_requested());
 }
 
+TEST(ReplayComponent, DoesNotAskForTheExitWhileAComponentHasWork) {
+  const TemporaryFolder folder;
+  recording::write_bag(folder.file("bag"), {{"/a", 0.0, 7}});
+  FakeContext fake;
+  fake.set_parameter("bag", folder.file("bag"));
+  fake.set_parameter("exit_at_end", true);
+  fake.set_parameter("settle_s", 0.0);
+  fake.set_all_idle(false);
+  ReplayComponent replay(fake);
+  replay.start();
+  ASSERT_TRUE(run_until(fake, [&] { return logged(fake, "1 messages sent"); }));
+  fake.advance(std::chrono::minutes(10));
+  EXPECT_FALSE(fake.exit_requested());
+  fake.set_all_idle(true);
+  fake.advance(std::chrono::milliseconds(200));
+  EXPECT_TRUE(fake.exit_requested());
+}
+
 /// Two frames in lockstep, which sync and tracking report.
 class ReplayToTheEnd : public ::testing::Test {
  protected:

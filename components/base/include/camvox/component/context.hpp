@@ -183,6 +183,10 @@ class Context {
   /// Asks the container to end as after Ctrl-C, because the work is done (a recording has ended).
   virtual void request_exit() {}
 
+  /// False while a component of this container has yet to see to a message or to posted work, the
+  /// callback that asks not counted. Timers, and threads of the components' own, do not count.
+  [[nodiscard]] virtual bool all_idle() const { return true; }
+
  protected:
   using ChangeHandler =
       std::function<std::vector<config::Problem>(const config::ParameterMap& changes)>;

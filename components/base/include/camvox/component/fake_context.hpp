@@ -113,6 +113,9 @@ class FakeContext final : public Context {
   void post(std::function<void()> callback) override;
   void request_exit() override { exit_requested_ = true; }
   [[nodiscard]] bool exit_requested() const { return exit_requested_; }
+  [[nodiscard]] bool all_idle() const override { return all_idle_; }
+  /// What all_idle() tells; true unless set.
+  void set_all_idle(bool idle) { all_idle_ = idle; }
 
  protected:
   [[nodiscard]] const config::ParameterMap& given_parameters() const override { return given_; }
@@ -167,6 +170,7 @@ class FakeContext final : public Context {
   std::string name_;
   std::int64_t now_ns_;
   bool exit_requested_ = false;
+  bool all_idle_ = true;
   config::ParameterMap given_;
   config::ParameterMap effective_;
   ChangeHandler change_handler_;

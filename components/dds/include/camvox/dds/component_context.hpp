@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -27,6 +28,7 @@ struct Middleware {
   std::shared_ptr<Participant> participant;
   std::shared_ptr<Gateway> gateway;  ///< Carries internal topics to and from other processes.
   TopicSettingsMap topics;
+  std::function<bool()> all_idle;  ///< What Context::all_idle tells, from any thread; or none.
 };
 
 /// Creates what the components of a container share.
@@ -94,6 +96,9 @@ class ComponentContext final : public Context {
   void post(std::function<void()> callback) override;
   void request_exit() override {
     if (exit_request_) exit_request_();
+  }
+  [[nodiscard]] bool all_idle() const override {
+    return !middleware_.all_idle || middleware_.all_idle();
   }
   /// What request_exit does; before the component is made.
   void on_exit_request(std::function<void()> callback) { exit_request_ = std::move(callback); }

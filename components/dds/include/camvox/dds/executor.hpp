@@ -7,6 +7,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <vector>
 
 namespace eprosima::fastdds::dds {
 class Condition;
@@ -66,6 +67,11 @@ class Executor {
   /// Makes the thread look at all of its sources again; works from any thread, and does nothing
   /// once the executor is gone.
   [[nodiscard]] std::function<void()> waker() const;
+  /// True: the thread has nothing to do but wait for news, and its sources have none. Asked on the
+  /// thread itself: there is nothing left but the callback that asks.
+  [[nodiscard]] bool idle() const;
+  /// How often the thread has begun to wait.
+  [[nodiscard]] std::uint64_t waits() const;
   /// Drops the sources, timers and posted work of a tenant. On return nothing of it runs any more
   /// (unless called from one of its own callbacks). False: a callback of it did not end in time.
   bool remove(const std::shared_ptr<Tenant>& tenant, std::chrono::milliseconds timeout);
@@ -74,5 +80,9 @@ class Executor {
   struct Implementation;
   std::shared_ptr<Implementation> implementation_;
 };
+
+/// True if no executor has anything left to do, so that only timers, other threads or other
+/// processes can give them more: what one handed to the other has been seen to as well.
+[[nodiscard]] bool all_idle(const std::vector<std::shared_ptr<Executor>>& executors);
 
 }  // namespace camvox::dds

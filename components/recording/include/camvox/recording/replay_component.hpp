@@ -35,9 +35,10 @@ struct ReplayConfig {
   /// Starts when each of these topics has a publisher and a subscriber, one of them in another
   /// process: a back end that is not there yet would miss the first frames.
   std::vector<std::string> wait_for_topics;
-  /// Ends the container when the recording is over, and in lockstep the last frame is done.
+  /// Ends the container when the recording is over, no component has anything left to do, and in
+  /// lockstep the last frame is done.
   bool exit_at_end = false;
-  double settle_s = 2.0;  ///< How long nothing must be reported done before that.
+  double settle_s = 2.0;  ///< And nothing has been reported done for so long, for other processes.
 
   template <typename Self, typename Visitor>
   static void visit(Self& self, Visitor&& field) {
