@@ -120,6 +120,16 @@ Subscription ProbeContext::make_raw_subscription(const Port& port,
   return std::make_shared<SilentSubscription>();
 }
 
+void ProbeContext::make_service(const Port& port,
+                                const MessageType& request,
+                                const MessageType&,
+                                ServiceHandler) {
+  static constexpr std::string_view kEnd = "_Request";
+  std::string_view type = request.ros_name;
+  if (type.ends_with(kEnd)) type.remove_suffix(kEnd.size());
+  record(port, type, false, false, false);
+}
+
 ProbedComponent ProbeContext::take_result() { return std::move(result_); }
 
 void ProbeContext::check_complete() {

@@ -40,6 +40,10 @@ class ProbeContext final : public Context {
                                      std::string_view type_name,
                                      Callback callback,
                                      const SubscribeOptions& options) override;
+  void make_service(const Port& port,
+                    const MessageType& request,
+                    const MessageType& response,
+                    ServiceHandler handler) override;
 
  private:
   void record(

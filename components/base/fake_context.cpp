@@ -260,4 +260,24 @@ Subscription FakeContext::make_raw_subscription(const Port& port,
              raw_message_type(type_name), true, std::move(callback), options);
 }
 
+void FakeContext::make_service(const Port& port,
+                               const MessageType& request,
+                               const MessageType& response,
+                               ServiceHandler handler) {
+  require_new(services_, "service", port.name);
+  services_[std::string(port.name)] =
+      std::make_unique<Service>(Service{&request, &response, std::move(handler)});
+}
+
+const Context::ServiceHandler& FakeContext::service(std::string_view port,
+                                                    const MessageType* request,
+                                                    const MessageType* response) const {
+  const auto& service = find_port(services_, "service", port);
+  if (service.request != request || service.response != response) {
+    throw std::logic_error(fmt::format(
+        "service port '{}' takes {}, not {}", port, service.request->ros_name, request->ros_name));
+  }
+  return service.handler;
+}
+
 }  // namespace camvox

@@ -93,7 +93,9 @@ void ComponentContext::activate() {
 }
 
 bool ComponentContext::deactivate(std::chrono::milliseconds timeout) {
-  return executor_->remove(tenant_, timeout);
+  if (!executor_->remove(tenant_, timeout)) return false;
+  services_.clear();  // their calls run as the component's own, so that none of them does any more
+  return true;
 }
 
 void ComponentContext::when_active(std::function<void()> action) {
@@ -255,6 +257,24 @@ Subscription ComponentContext::make_raw_subscription(const Port& port,
                                                      Callback callback,
                                                      const SubscribeOptions& options) {
   return make_ros_subscription(port, raw_message_type(type_name), std::move(callback), options);
+}
+
+void ComponentContext::make_service(const Port& port,
+                                    const MessageType& request,
+                                    const MessageType& response,
+                                    ServiceHandler handler) {
+  when_active([this, name = topic_of(port), &request, &response, handler = std::move(handler)] {
+    services_.push_back(std::make_unique<ServiceServer>(
+        middleware_.participant,
+        *executor_,
+        tenant_,
+        name,
+        request,
+        response,
+        [tenant = tenant_, handler](const void* question, void* answer) {
+          tenant->invoke([&] { handler(question, answer); });
+        }));
+  });
 }
 
 }  // namespace camvox::dds

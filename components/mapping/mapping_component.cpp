@@ -26,6 +26,10 @@ constexpr std::size_t kMaxFramesBehind = 64;
 constexpr std::size_t kManyKeyframes = 3;
 constexpr std::size_t kAnswersKept = 64;
 
+std::filesystem::path map_path(const MappingComponentConfig& config) {
+  return std::filesystem::path(config.output_dir) / "map.mcap";
+}
+
 }  // namespace
 
 MappingComponent::MappingComponent(Context& context)
@@ -56,9 +60,12 @@ MappingComponent::MappingComponent(Context& context)
   context.on_parameter_change<MappingComponentConfig>(config_,
                                                       [this](const MappingComponentConfig& next) {
                                                         config_.save_map = next.save_map;
-                                                        if (next.save_map) (void)save();
+                                                        if (next.save_map) (void)save_changes();
                                                       },
                                                       {"save_map"});
+  context.serve<std_srvs::srv::Trigger_Request, std_srvs::srv::Trigger_Response>(
+      {"save_map", "/camvox/save_map"},
+      [this](const auto&, auto& response) { on_save_request(response); });
   context.every(std::chrono::milliseconds(500), [this] { announce(); });
   context.every(std::chrono::seconds(1), [this] { report_memory(); });
 }
@@ -80,7 +87,7 @@ void MappingComponent::start() {
 
 void MappingComponent::stop() {
   runner_.reset();
-  if (config_.save_map && !save()) throw std::runtime_error("the map was not saved");
+  if (config_.save_map && !save_changes()) throw std::runtime_error("the map was not saved");
 }
 
 void MappingComponent::load() {
@@ -102,22 +109,39 @@ void MappingComponent::load() {
   announcer_.begin(mapper_, updates_);
 }
 
-bool MappingComponent::save() {
+/// Why the map is not to be saved, or "".
+std::string MappingComponent::nothing_to_save() const {
+  if (config_.output_dir.empty()) return "there is no folder for it: output_dir (--out) is not set";
+  if (config_.localisation_only) return "the loaded map stays as it is (localisation_only)";
+  if (mapper_.map().keyframes().empty()) return "the map is empty";
+  return {};
+}
+
+/// Returns what went wrong, or "".
+std::string MappingComponent::save() {
   const auto& map = mapper_.map();
-  const bool changed = !config_.localisation_only && !map.keyframes().empty();
-  if (config_.output_dir.empty() || !changed) return true;
-  const auto path = std::filesystem::path(config_.output_dir) / "map.mcap";
+  const auto path = map_path(config_);
   const auto status = mapping::save_map(path, map, mapper_.epoch(), mapper_.model().camera());
   if (!status.ok()) {
     context_.log().error("{}", status.message());
-    return false;
+    return status.message();
   }
   context_.log().info("map of {} keyframes, {} landmarks ({:.1f} MB) saved to {}",
                       map.keyframes().size(),
                       map.landmark_count(),
                       1e-6 * static_cast<double>(map.memory_bytes()),
                       path.string());
-  return true;
+  return {};
+}
+
+/// False if there was something to save and it failed.
+bool MappingComponent::save_changes() { return !nothing_to_save().empty() || save().empty(); }
+
+void MappingComponent::on_save_request(std_srvs::srv::Trigger_Response& response) {
+  auto problem = nothing_to_save();
+  if (problem.empty()) problem = save();
+  response.success(problem.empty());
+  response.message(problem.empty() ? map_path(config_).string() : problem);
 }
 
 /// Until tracking has sent a pose it may not be there yet, or not hear what is said.

@@ -8,6 +8,7 @@
 
 #include "camvox/component/component.hpp"
 #include "camvox/interfaces/camvox_interfaces.hpp"
+#include "camvox/interfaces/composition_interfaces.hpp"
 #include "camvox/interfaces/sensor_msgs.hpp"
 
 namespace camvox {
@@ -303,6 +304,24 @@ TEST(FakeContext, RefusesCountersOverCapacity) {
   EXPECT_THAT([&] { publisher.publish(std::move(loan)); },
               ThrowsMessage<std::logic_error>(HasSubstr("capacity")));
   EXPECT_THAT(fake.published<Cloud>("out"), IsEmpty());
+}
+
+TEST(FakeContext, CallsTheServicesOfTheComponent) {
+  using composition_interfaces::srv::UnloadNode_Request;
+  using composition_interfaces::srv::UnloadNode_Response;
+  FakeContext fake;
+  fake.serve<UnloadNode_Request, UnloadNode_Response>(
+      {"unload", "/unload"}, [](const auto& request, auto& response) {
+        response.error_message("no " + std::to_string(request.unique_id()));
+      });
+  UnloadNode_Request request;
+  request.unique_id(4);
+  const auto answer = fake.call<UnloadNode_Request, UnloadNode_Response>("unload", request);
+  EXPECT_EQ(answer.error_message(), "no 4");
+  EXPECT_THROW(((void)fake.call<UnloadNode_Request, UnloadNode_Response>("load", request)),
+               std::logic_error);
+  EXPECT_THROW(((void)fake.call<UnloadNode_Response, UnloadNode_Response>("unload", answer)),
+               std::logic_error);
 }
 
 TEST(FakeContext, SubscriberCountIsTheTests) {

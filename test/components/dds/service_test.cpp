@@ -95,5 +95,37 @@ TEST(Service, AnExceptionReachesTheTenantAndTheServerGoesOn) {
   EXPECT_EQ(server.errors, errors);
 }
 
+/// A component that answers with the number that it is asked for; 13 is an exception.
+void serve_echo(ComponentContext& context) {
+  context.serve<UnloadNode_Request, UnloadNode_Response>(
+      {"echo", "/echo"}, [](const UnloadNode_Request& request, UnloadNode_Response& response) {
+        response.error_message(std::to_string(request.unique_id()));
+        if (request.unique_id() == 13) throw std::runtime_error("unlucky");
+      });
+}
+
+TEST(ComponentService, AnswersOnceTheComponentIsActive) {
+  test::TestContainer container;
+  auto& component = container.component();
+  serve_echo(component);
+  test::MemoryLogger log;
+  const auto client = Participant::create(test::test_options("client"), log);
+  EXPECT_EQ(ask(client, 1, 300ms), "no answer");
+  container.activate();
+  EXPECT_EQ(ask(client, 2), "2");
+  container.remove(component);
+  EXPECT_EQ(ask(client, 3, 300ms), "no answer");
+}
+
+TEST(ComponentService, AnExceptionIsTheComponentsOwn) {
+  test::TestContainer container;
+  serve_echo(container.component());
+  container.activate();
+  test::MemoryLogger log;
+  const auto client = Participant::create(test::test_options("client"), log);
+  EXPECT_EQ(ask(client, 13), "13") << "the caller is answered all the same";
+  EXPECT_THAT(container.errors(), ::testing::ElementsAre(::testing::HasSubstr("unlucky")));
+}
+
 }  // namespace
 }  // namespace camvox::dds

@@ -93,6 +93,10 @@ class MappingTest : public testing::Test {
       correction.keyframe_poses_count(count);
     });
   }
+  [[nodiscard]] std_srvs::srv::Trigger_Response call_save() {
+    return fake_.call<std_srvs::srv::Trigger_Request, std_srvs::srv::Trigger_Response>("save_map",
+                                                                                       {});
+  }
   [[nodiscard]] std::vector<std::shared_ptr<const LocalMap>> maps() const {
     return fake_.published<LocalMap>("local_map");
   }
@@ -423,6 +427,51 @@ TEST_F(LoadedMapTest, IsSavedAtTheEndAndOnRequest) {
   mapping.stop();
   EXPECT_EQ(bytes(), after);
   EXPECT_THAT(log(), HasSubstr("map of 4 keyframes"));
+}
+
+TEST_F(LoadedMapTest, IsSavedWhenTheServiceIsCalled) {
+  fake_.set_parameter("output_dir", folder_.string());
+  fake_.set_parameter("save_map", false);
+  MappingComponent mapping(fake_);
+  mapping.start();
+  acknowledge_all();
+  send_keyframe(4, 0.9);
+  send_pose(1, 4);
+  std::filesystem::remove(file());
+  const auto saved = call_save();
+  EXPECT_TRUE(saved.success());
+  EXPECT_EQ(saved.message(), file().string());
+  const auto loaded = mapping::load_map(file(), mapping.mapper().model().camera());
+  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+  EXPECT_EQ(loaded->map.keyframes().size(), 4U);
+}
+
+TEST_F(LoadedMapTest, TheServiceSaysWhyItSavesNothing) {
+  fake_.set_parameter("output_dir", (folder_ / "no_such_folder").string());
+  MappingComponent mapping(fake_);
+  EXPECT_FALSE(call_save().success());
+  EXPECT_EQ(call_save().message(), "the map is empty");
+  mapping.start();
+  const auto failed = call_save();
+  EXPECT_FALSE(failed.success());
+  EXPECT_THAT(failed.message(), HasSubstr("no_such_folder/map.mcap"));
+}
+
+TEST_F(LoadedMapTest, TheServiceSavesNoMapThatStaysAsItIs) {
+  fake_.set_parameter("output_dir", folder_.string());
+  fake_.set_parameter("localisation_only", true);
+  MappingComponent mapping(fake_);
+  mapping.start();
+  EXPECT_FALSE(call_save().success());
+  EXPECT_THAT(call_save().message(), HasSubstr("localisation_only"));
+}
+
+TEST_F(MappingTest, TheServiceNeedsAFolder) {
+  MappingComponent mapping(fake_);
+  send_keyframe(1, 0.0);
+  send_pose(1, 1);
+  EXPECT_FALSE(call_save().success());
+  EXPECT_THAT(call_save().message(), HasSubstr("output_dir (--out) is not set"));
 }
 
 TEST_F(LoadedMapTest, IsRefusedWhenItIsBroken) {

@@ -25,8 +25,8 @@ using interfaces::Qos;
 namespace qos = interfaces::qos;
 namespace topics = interfaces::topics;
 
-/// One input or output of a component: its name in the config's `remap`, and the topic it is
-/// connected to unless remapped.
+/// One input, output or service of a component: its name in the config's `remap`, and the topic it
+/// is connected to unless remapped.
 struct Port {
   std::string_view name;
   std::string_view default_topic;
@@ -86,6 +86,7 @@ struct TopicDescription {
 class Context {
  public:
   using Callback = std::function<void(std::shared_ptr<const void>, const MessageInfo&)>;
+  using ServiceHandler = std::function<void(const void* request, void* response)>;
 
   Context() = default;
   Context(const Context&) = delete;
@@ -170,6 +171,19 @@ class Context {
         options);
   }
 
+  /// Answers the calls of a ROS 2 service on the component's thread. When the handler throws, the
+  /// caller gets the response as it is by then.
+  template <typename Request, typename Response>
+  void serve(const Port& port, std::function<void(const Request&, Response&)> handler) {
+    make_service(port,
+                 interfaces::message_type<Request>(),
+                 interfaces::message_type<Response>(),
+                 [handler = std::move(handler)](const void* request, void* response) {
+                   handler(*static_cast<const Request*>(request),
+                           *static_cast<Response*>(response));
+                 });
+  }
+
   /// All topics that this process or another one publishes or reads at the moment, by name.
   [[nodiscard]] virtual std::vector<TopicDescription> topics() const { return {}; }
 
@@ -210,6 +224,10 @@ class Context {
                                              std::string_view type_name,
                                              Callback callback,
                                              const SubscribeOptions& options) = 0;
+  virtual void make_service(const Port& port,
+                            const MessageType& request,
+                            const MessageType& response,
+                            ServiceHandler handler) = 0;
 };
 
 }  // namespace camvox

@@ -63,6 +63,14 @@ class FakeContext final : public Context {
     deliver(port, std::move(message));
   }
 
+  /// Calls a service of the component and returns what it answers.
+  template <typename Request, typename Response>
+  [[nodiscard]] Response call(std::string_view port, const Request& request) {
+    Response response;
+    service(port, type_of<Request>(), type_of<Response>())(&request, &response);
+    return response;
+  }
+
   /// All that the component published on an output, oldest first.
   template <typename T>
   [[nodiscard]] std::vector<std::shared_ptr<const T>> published(std::string_view port) const {
@@ -136,6 +144,10 @@ class FakeContext final : public Context {
                                      std::string_view type_name,
                                      Callback callback,
                                      const SubscribeOptions& options) override;
+  void make_service(const Port& port,
+                    const MessageType& request,
+                    const MessageType& response,
+                    ServiceHandler handler) override;
 
  private:
   class CapturingLogger;
@@ -165,6 +177,9 @@ class FakeContext final : public Context {
       std::string_view port, const MessageType* type) const;
   [[nodiscard]] FakePublisher& output(std::string_view port) const;
   [[nodiscard]] FakeSubscription& input(std::string_view port) const;
+  [[nodiscard]] const ServiceHandler& service(std::string_view port,
+                                              const MessageType* request,
+                                              const MessageType* response) const;
   [[nodiscard]] Timer* next_due(std::int64_t until_ns);
 
   std::string name_;
@@ -179,6 +194,12 @@ class FakeContext final : public Context {
   std::vector<TopicDescription> topics_;
   std::map<std::string, std::shared_ptr<FakePublisher>, std::less<>> outputs_;
   std::map<std::string, std::shared_ptr<FakeSubscription>, std::less<>> inputs_;
+  struct Service {
+    const MessageType* request = nullptr;
+    const MessageType* response = nullptr;
+    ServiceHandler handler;
+  };
+  std::map<std::string, std::unique_ptr<Service>, std::less<>> services_;
   std::deque<Timer> timers_;
   mutable std::mutex posted_mutex_;
   std::condition_variable posted_something_;

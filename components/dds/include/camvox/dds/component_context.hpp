@@ -11,6 +11,7 @@
 #include "camvox/component/context.hpp"
 #include "camvox/dds/executor.hpp"
 #include "camvox/dds/participant.hpp"
+#include "camvox/dds/service.hpp"
 
 namespace camvox::dds {
 
@@ -124,6 +125,10 @@ class ComponentContext final : public Context {
                                      std::string_view type_name,
                                      Callback callback,
                                      const SubscribeOptions& options) override;
+  void make_service(const Port& port,
+                    const MessageType& request,
+                    const MessageType& response,
+                    ServiceHandler handler) override;
 
  private:
   [[nodiscard]] std::string topic_of(const Port& port) const;
@@ -147,6 +152,7 @@ class ComponentContext final : public Context {
   bool active_ = false;
   std::vector<std::function<void()>> pending_;
   std::vector<std::pair<std::string, Subscription>> subscriptions_;
+  std::vector<std::unique_ptr<ServiceServer>> services_;
   std::vector<std::shared_ptr<void>> border_handles_;  // what the gateway carries for us
 };
 

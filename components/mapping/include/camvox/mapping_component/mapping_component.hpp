@@ -10,6 +10,7 @@
 #include "camvox/component/component.hpp"
 #include "camvox/component/progress.hpp"
 #include "camvox/interfaces/camvox_interfaces.hpp"
+#include "camvox/interfaces/std_srvs.hpp"
 #include "camvox/mapping/mapper.hpp"
 #include "camvox/mapping_component/job_runner.hpp"
 #include "camvox/mapping_component/map_announcer.hpp"
@@ -60,6 +61,9 @@ struct MappingComponentConfig {
 /// Keyframes come in without a gap. When some were lost (the link was cut) or all (this process was
 /// restarted), frames are answered with the map as it is; it says which keyframe is the next, and
 /// tracking sends what is missing once more, in order.
+///
+/// The service /camvox/save_map (std_srvs/srv/Trigger) saves the map as it is; it answers with the
+/// file, or with what is wrong.
 class MappingComponent final : public Component {
  public:
   explicit MappingComponent(Context& context);
@@ -90,7 +94,10 @@ class MappingComponent final : public Component {
   void follow(const Waiting& frame);
   void answer(const Waiting& frame);
   void load();
-  [[nodiscard]] bool save();
+  [[nodiscard]] std::string nothing_to_save() const;
+  [[nodiscard]] std::string save();
+  [[nodiscard]] bool save_changes();
+  void on_save_request(std_srvs::srv::Trigger_Response& response);
   void announce();
   [[nodiscard]] std::string problem_with(const tracking::Keyframe& keyframe) const;
   void insert(const tracking::Keyframe& keyframe);
