@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "camvox/conversion/image.hpp"
+#include "camvox/conversion/cv_image.hpp"
 #include "camvox/depth/overlay.hpp"
 
 namespace camvox {
@@ -16,17 +16,6 @@ namespace {
 constexpr std::size_t kFramesKept = 4;
 constexpr std::int64_t kSecond_ns = 1'000'000'000;
 constexpr std::int64_t kNear_ns = kSecond_ns / 2;
-
-cv::Mat colours_of(const camvox_interfaces::msg::FrameImage& image) {
-  cv::Mat bgr(static_cast<int>(image.height_px()), static_cast<int>(image.width_px()), CV_8UC3);
-  for (int v = 0; v < bgr.rows; ++v) {
-    for (int u = 0; u < bgr.cols; ++u) {
-      const auto pixel = conversion::bgr_at(image, u, v);
-      bgr.at<cv::Vec3b>(v, u) = {pixel[0], pixel[1], pixel[2]};
-    }
-  }
-  return bgr;
-}
 
 }  // namespace
 
@@ -124,7 +113,7 @@ void DepthOverlayComponent::write(const Frame& frame, const std::filesystem::pat
   const depth::FrameLabel label{image.header().frame_id(), image.header().stamp_ns()};
   bool written = false;
   try {
-    written = cv::imwrite(file, depth::draw_overlay(colours_of(image), depth, label));
+    written = cv::imwrite(file, depth::draw_overlay(conversion::to_bgr(image), depth, label));
   } catch (const cv::Exception&) {
     written = false;
   }

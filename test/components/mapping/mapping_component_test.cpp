@@ -334,6 +334,13 @@ class LoadedMapTest : public MappingTest {
   void acknowledge_all() {
     for (const std::uint64_t id : {1U, 2U, 3U, 1U}) acknowledge(id);
   }
+  /// The loaded map's three keyframes are known to all, and tracking makes one more.
+  void start_and_send_a_fourth(MappingComponent& mapping) {
+    mapping.start();
+    acknowledge_all();
+    send_keyframe(4, 0.9);
+    send_pose(1, 4);
+  }
 
   std::filesystem::path folder_ =
       std::filesystem::path(testing::TempDir()) / ("mapping_" + std::to_string(getpid()));
@@ -368,10 +375,7 @@ TEST_F(LoadedMapTest, IsAnnouncedAsLoopClosingTakesItIn) {
 
 TEST_F(LoadedMapTest, GoesOnWithTheNextId) {
   MappingComponent mapping(fake_);
-  mapping.start();
-  acknowledge_all();
-  send_keyframe(4, 0.9);
-  send_pose(1, 4);
+  start_and_send_a_fourth(mapping);
   EXPECT_EQ(mapping.mapper().map().keyframes().size(), 4U);
   EXPECT_EQ(conversion::read_local_map(*maps().back()).reference_keyframe_id, 4U);
   mapping.stop();
@@ -398,10 +402,7 @@ TEST_F(LoadedMapTest, StaysAsItIsForLocalisationOnly) {
   fake_.set_parameter("output_dir", folder_.string());
   const auto before = bytes();
   MappingComponent mapping(fake_);
-  mapping.start();
-  acknowledge_all();
-  send_keyframe(4, 0.9);
-  send_pose(1, 4);
+  start_and_send_a_fourth(mapping);
   send_correction(1, {{1, 0.0}, {2, 0.35}, {3, 0.7}});
   send_pose(2, 3);
   EXPECT_EQ(mapping.mapper().map().keyframes().size(), 3U);
@@ -415,10 +416,7 @@ TEST_F(LoadedMapTest, IsSavedAtTheEndAndOnRequest) {
   fake_.set_parameter("output_dir", folder_.string());
   fake_.set_parameter("save_map", false);
   MappingComponent mapping(fake_);
-  mapping.start();
-  acknowledge_all();
-  send_keyframe(4, 0.9);
-  send_pose(1, 4);
+  start_and_send_a_fourth(mapping);
   const auto before = bytes();
   EXPECT_TRUE(fake_.change_parameters({{"save_map", {true, {}}}}).empty());
   const auto after = bytes();
@@ -433,10 +431,7 @@ TEST_F(LoadedMapTest, IsSavedWhenTheServiceIsCalled) {
   fake_.set_parameter("output_dir", folder_.string());
   fake_.set_parameter("save_map", false);
   MappingComponent mapping(fake_);
-  mapping.start();
-  acknowledge_all();
-  send_keyframe(4, 0.9);
-  send_pose(1, 4);
+  start_and_send_a_fourth(mapping);
   std::filesystem::remove(file());
   const auto saved = call_save();
   EXPECT_TRUE(saved.success());
