@@ -114,10 +114,10 @@ void LoopClosingComponent::look_for_loops(const Header& header, tracking::Keyfra
   left_out_ += busy ? 1 : 0;
   auto task = std::make_shared<loop::VerificationTask>();
   if (config_.enabled && !busy) *task = closer_.detect(id);
-  if (task->candidates.empty()) return answer_keyframe(header, nullptr);
+  if (task->empty()) return answer_keyframe(header, nullptr);
   run([this, header, id, task] {
     const double before_s = thread_processor_time_s();
-    auto places = loop::verify(*task, camera_, config_.loop.verification);
+    auto places = loop::verify(*task, camera_, config_.loop);
     const double time_s = worker_ ? thread_processor_time_s() - before_s : 0.0;
     return [this, header, id, time_s, places = std::move(places)] {
       progress_.add(time_s);
@@ -138,9 +138,10 @@ void LoopClosingComponent::verified(const Header& header,
     const double time_s = thread_processor_time_s() - before_s;
     return [this, header, time_s, correction = std::move(correction)] {
       if (worker_) progress_.add(time_s);
-      context_.log().info("loop {} -> {}: {}, {:.0f} ms",
+      context_.log().info("loop {} -> {}{}: {}, {:.0f} ms",
                           correction.loop.query_id,
                           correction.loop.match_id,
+                          correction.loop.by_surfaces ? " by surfaces" : "",
                           correction.summary.to_string(),
                           1e3 * time_s);
       context_.diagnostics().set("pose_graph", correction.summary.to_string());
@@ -185,7 +186,7 @@ void LoopClosingComponent::on_request(const Keyframe& message) {
       std::make_shared<features::FrameFeatures>(conversion::read_keyframe(message).features);
   auto task = std::make_shared<loop::VerificationTask>(closer_.detect_lost(std::move(features)));
   run([this, header, task] {
-    auto places = loop::verify(*task, camera_, config_.loop.verification);
+    auto places = loop::verify(*task, camera_, config_.loop);
     return [this, header, places = std::move(places)] { answer_request(header, places); };
   });
 }
@@ -210,6 +211,9 @@ void LoopClosingComponent::report() {
   diagnostics.set("index_mb", 1e-6 * static_cast<double>(closer_.index().bytes()));
   diagnostics.set("places_verified", statistics.places_verified);
   diagnostics.set("places_confirmed", statistics.places_confirmed);
+  diagnostics.set("surfaces_compared", statistics.surfaces_compared);
+  diagnostics.set("surfaces_confirmed", statistics.surfaces_confirmed);
+  diagnostics.set("surface_loops", statistics.surface_loops);
   diagnostics.set("places_implausible", statistics.implausible);
   diagnostics.set("places_ambiguous", statistics.ambiguous);
   diagnostics.set("loops", statistics.loops);

@@ -40,6 +40,7 @@ bool write(const loop::Correction& correction, camvox_interfaces::msg::LoopCorre
   message.match_keyframe_id(correction.loop.match_id);
   message.T_match_query() = to_array(correction.loop.T_match_query);
   message.covariance_query() = to_array(correction.loop.covariance_query);
+  message.by_surfaces(correction.loop.by_surfaces ? 1 : 0);
   std::uint32_t count = 0;
   for (const auto& [id, T_map_camera] : correction.T_map_camera) {
     message.keyframe_ids()[count] = id;

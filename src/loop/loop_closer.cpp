@@ -19,6 +19,35 @@ bool same_loop(const LoopMeasurement& a, const LoopMeasurement& b) {
 
 std::size_t size_of(int count) { return static_cast<std::size_t>(count); }
 
+VerificationStatus to_verification_status(RegistrationStatus status) {
+  switch (status) {
+    case RegistrationStatus::kOk:
+      return VerificationStatus::kOk;
+    case RegistrationStatus::kNothing:
+      return VerificationStatus::kNoRigidMotion;
+    case RegistrationStatus::kNotDistinct:
+      return VerificationStatus::kDepthDisagrees;
+    case RegistrationStatus::kUncertain:
+      return VerificationStatus::kUncertain;
+  }
+  return VerificationStatus::kNoRigidMotion;
+}
+
+VerifiedPlace verified_by_surfaces(const SurfaceTask& task,
+                                   const optimization::PinholeCamera& camera,
+                                   const SurfacePlacesConfig& config) {
+  const auto registration = verify(task, camera, config);
+  VerifiedPlace place;
+  place.match_id = task.match_id;
+  place.score = registration.distinction;
+  place.by_surfaces = true;
+  place.verification.status = to_verification_status(registration.status);
+  place.verification.T_place_query = registration.T_target_source;
+  place.verification.covariance_query = registration.covariance_source;
+  place.verification.inliers = registration.points;
+  return place;
+}
+
 }  // namespace
 
 LoopCloser::LoopCloser(const LoopCloserConfig& config) : config_(config), index_(config.index) {
@@ -77,6 +106,7 @@ VerificationTask LoopCloser::detect(KeyframeId id) const {
   });
   task.candidates = best_places(scores, size_of(config_.max_places));
   task.same_place_m = config_.min_path_m;
+  task.surfaces = find_surface_place(map_, id, loop_connections(), config_.drift, config_.surfaces);
   return task;
 }
 
@@ -146,20 +176,36 @@ std::optional<CorrectionTask> LoopCloser::consider(KeyframeId id,
     std::set<KeyframeId> queries;
     for (const auto& loop : set) queries.insert(loop.query_id);
     if (queries.size() < size_of(config_.consistent_queries)) continue;
+    if (!says_something_new(measurement)) continue;
     accepted = true;
     newest = measurement;
-    for (const auto& loop : set) {
-      const auto same = [&](const LoopMeasurement& other) { return same_loop(loop, other); };
-      std::erase_if(pending_, same);
-      if (std::any_of(loops_.begin(), loops_.end(), same)) continue;
-      loops_.push_back(loop);
-      ++statistics_.loops;
-    }
+    accept(set);
   }
   if (!accepted || !due(newest)) return std::nullopt;
   keyframes_since_correction_ = 0;
   ++statistics_.corrections;
   return correction_task(newest);
+}
+
+void LoopCloser::accept(const std::vector<LoopMeasurement>& set) {
+  for (const auto& loop : set) {
+    const auto same = [&](const LoopMeasurement& other) { return same_loop(loop, other); };
+    std::erase_if(pending_, same);
+    if (std::any_of(loops_.begin(), loops_.end(), same) || !says_something_new(loop)) continue;
+    loops_.push_back(loop);
+    ++statistics_.loops;
+    statistics_.surface_loops += loop.by_surfaces ? 1 : 0;
+  }
+}
+
+/// Surfaces tell a pose to a decimetre, images to a centimetre. Where the map agrees with surfaces
+/// within their error, it is the better of the two.
+bool LoopCloser::says_something_new(const LoopMeasurement& loop) const {
+  if (!loop.by_surfaces) return true;
+  const Vector6d error =
+      geometry::local(map_.relative_pose(loop.match_id, loop.query_id), loop.T_match_query);
+  return error.dot(loop.covariance_query.llt().solve(error)) >
+         config_.surfaces.min_correction * config_.surfaces.min_correction;
 }
 
 /// Measurements that the map's drift allows; none when they contradict each other.
@@ -168,10 +214,10 @@ std::vector<LoopMeasurement> LoopCloser::plausible_measurements(
   std::vector<LoopMeasurement> measurements;
   std::map<KeyframeId, double> paths_m;
   for (const auto& place : places) {
-    ++statistics_.places_verified;
+    ++(place.by_surfaces ? statistics_.surfaces_compared : statistics_.places_verified);
     const bool known = map_.find(id) != nullptr && map_.find(place.match_id) != nullptr;
     if (!known || place.verification.status != VerificationStatus::kOk) continue;
-    ++statistics_.places_confirmed;
+    ++(place.by_surfaces ? statistics_.surfaces_confirmed : statistics_.places_confirmed);
     if (paths_m.empty()) {
       paths_m = map_.path_lengths(id, std::numeric_limits<double>::infinity(), loop_connections());
     }
@@ -179,7 +225,8 @@ std::vector<LoopMeasurement> LoopCloser::plausible_measurements(
                                       place.match_id,
                                       place.verification.T_place_query,
                                       place.verification.covariance_query,
-                                      place.verification.inliers};
+                                      place.verification.inliers,
+                                      place.by_surfaces};
     const auto path_m = paths_m.find(place.match_id);
     if (path_m != paths_m.end() &&
         !plausible(
@@ -300,7 +347,7 @@ std::optional<Relocalisation> LoopCloser::relocalise(
 
 std::vector<VerifiedPlace> verify(const VerificationTask& task,
                                   const optimization::PinholeCamera& camera,
-                                  const VerificationConfig& config) {
+                                  const LoopCloserConfig& config) {
   std::vector<VerifiedPlace> places;
   std::vector<Eigen::Vector3d> confirmed;
   for (const auto& candidate : task.candidates) {
@@ -312,11 +359,15 @@ std::vector<VerifiedPlace> verify(const VerificationTask& task,
     for (std::size_t i = 0; i < candidate.features.size(); ++i) {
       place.push_back({candidate.features[i].get(), candidate.T_match_camera[i]});
     }
-    places.push_back(
-        {candidate.match_id, candidate.score, verify(*task.query, place, camera, config)});
+    places.push_back({candidate.match_id,
+                      candidate.score,
+                      verify(*task.query, place, camera, config.verification)});
     if (places.back().verification.status == VerificationStatus::kOk) {
       confirmed.push_back(candidate.p_map_match);
     }
+  }
+  if (task.surfaces && confirmed.empty()) {
+    places.push_back(verified_by_surfaces(*task.surfaces, camera, config.surfaces));
   }
   return places;
 }

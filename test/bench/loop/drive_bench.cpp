@@ -6,10 +6,12 @@
 #include "camvox/component/progress.hpp"
 #include "camvox/loop/loop_closer.hpp"
 #include "drive.hpp"
+#include "reverse/there_and_back.hpp"
 
 /// Loop closing alone on a simulated drive: keyframes with true features and drifting odometry;
-/// corrections are applied as mapping would, without bundle adjustment. Prints Markdown rows.
-///   drive_bench PRESET CACHE_FOLDER [RATE_HZ] [SEEDS]
+/// corrections are applied as mapping would, without bundle adjustment. Prints Markdown rows, by
+/// images alone and with the surfaces of places passed in another direction.
+///   drive_bench loop_400m|campus_1800m|street|plaza|corridor CACHE_FOLDER [RATE_HZ] [SEEDS]
 namespace camvox::bench {
 namespace {
 
@@ -54,6 +56,9 @@ struct Result {
   int false_loops = 0;
   double worst_loop_m = 0.0;
   double worst_loop_deg = 0.0;
+  int wrong_surfaces = 0;               ///< Confirmed, and false.
+  std::vector<double> surface_sigma;    ///< Of those confirmed: error in its own sigma, / sqrt(6).
+  std::vector<double> surface_error_m;  ///< The same, in metres.
   std::vector<double> detect_ms, verify_ms, keyframe_ms, solve_ms;
   loop::LoopStatistics statistics;
 };
@@ -69,11 +74,49 @@ loop::MapChange neighbour_edges(const std::vector<tracking::Keyframe>& frames, s
   return change;
 }
 
-Result run(const Drive& drive, unsigned seed) {
+/// As all of this file calls a loop.
+bool is_false(const geometry::Vector6d& error) {
+  return error.tail<3>().norm() > 0.5 || error.head<3>().norm() > 0.05;
+}
+
+void look_at(const loop::VerifiedPlace& place, const SE3& T_match_query, Result& result) {
+  const auto& found = place.verification;
+  if (!place.by_surfaces || found.status != loop::VerificationStatus::kOk) return;
+  const auto error = geometry::local(T_match_query, found.T_place_query);
+  result.wrong_surfaces += is_false(error) ? 1 : 0;
+  const double squared = error.dot(found.covariance_query.ldlt().solve(error));
+  result.surface_sigma.push_back(std::sqrt(squared / 6.0));
+  result.surface_error_m.push_back(error.tail<3>().norm());
+}
+
+void print(std::uint64_t query, const loop::VerifiedPlace& place, const SE3& T_match_query) {
+  const auto& found = place.verification;
+  std::printf(
+      "%lu -> %lu true %.1f m %.0f deg: score %.2f %s%s matches %d ransac %d inliers %d cells %d "
+      "depth %.2f of %d err %.2f\n",
+      static_cast<unsigned long>(query),
+      static_cast<unsigned long>(place.match_id),
+      T_match_query.translation().norm(),
+      57.3 * T_match_query.rotation().angle_rad(),
+      place.score,
+      place.by_surfaces ? "surfaces: " : "",
+      std::string(to_string(found.status)).c_str(),
+      found.matches,
+      found.ransac_inliers,
+      found.inliers,
+      found.cells,
+      found.depth_agreement,
+      found.depths_compared,
+      geometry::local(T_match_query, found.T_place_query).tail<3>().norm());
+}
+
+Result run(const Drive& drive, unsigned seed, bool surfaces) {
   Result result;
   const auto odometry = drifted(drive.frames, seed);
   result.odometry_m = rmse_m(drive.frames, odometry);
-  loop::LoopCloser closer{loop::LoopCloserConfig()};
+  loop::LoopCloserConfig config;
+  config.surfaces.enabled = surfaces;
+  loop::LoopCloser closer{config};
   std::vector<SE3> poses;
   std::uint64_t epoch = 0;
   for (std::size_t i = 0; i < drive.frames.size(); ++i) {
@@ -89,30 +132,14 @@ Result run(const Drive& drive, unsigned seed) {
     const auto task = closer.detect(keyframe.id);
     const double t1 = thread_processor_time_s();
     result.detect_ms.push_back(1e3 * (t1 - t0));
-    const auto places = loop::verify(task, drive.camera, closer.config().verification);
-    if (std::getenv("VERBOSE") != nullptr) {
-      for (const auto& p : places) {
-        const SE3 T =
-            drive.frames[p.match_id - 1].T_map_camera.inverse() * drive.frames[i].T_map_camera;
-        std::printf(
-            "%zu -> %lu true %.1f m %.0f deg: score %.0f %s matches %d ransac %d inliers %d cells "
-            "%d depth %.2f of %d err %.2f\n",
-            i + 1,
-            static_cast<unsigned long>(p.match_id),
-            T.translation().norm(),
-            57.3 * T.rotation().angle_rad(),
-            p.score,
-            std::string(to_string(p.verification.status)).c_str(),
-            p.verification.matches,
-            p.verification.ransac_inliers,
-            p.verification.inliers,
-            p.verification.cells,
-            p.verification.depth_agreement,
-            p.verification.depths_compared,
-            geometry::local(T, p.verification.T_place_query).tail<3>().norm());
-      }
+    const auto places = loop::verify(task, drive.camera, closer.config());
+    for (const auto& place : places) {
+      const SE3 T =
+          drive.frames[place.match_id - 1].T_map_camera.inverse() * drive.frames[i].T_map_camera;
+      look_at(place, T, result);
+      if (std::getenv("VERBOSE") != nullptr) print(keyframe.id, place, T);
     }
-    if (!task.candidates.empty()) {
+    if (!task.empty()) {
       result.verify_ms.push_back(1e3 * (thread_processor_time_s() - t1));
     }
     const auto correction_task = closer.consider(keyframe.id, places);
@@ -136,7 +163,7 @@ Result run(const Drive& drive, unsigned seed) {
     const auto error = geometry::local(T, loop.T_match_query);
     result.worst_loop_m = std::max(result.worst_loop_m, error.tail<3>().norm());
     result.worst_loop_deg = std::max(result.worst_loop_deg, 57.3 * error.head<3>().norm());
-    if (error.tail<3>().norm() > 0.5 || error.head<3>().norm() > 0.05) ++result.false_loops;
+    result.false_loops += is_false(error) ? 1 : 0;
     result.closed.insert(loop.query_id - 1);
   }
   result.statistics = closer.statistics();
@@ -173,51 +200,63 @@ double quantile(std::vector<double> values, double q) {
   return values[static_cast<std::size_t>(q * static_cast<double>(values.size() - 1))];
 }
 
+void print_row(unsigned seed,
+               const char* by,
+               const Result& r,
+               const std::vector<std::vector<std::size_t>>& stretches) {
+  const auto closed = std::count_if(stretches.begin(), stretches.end(), [&](const auto& stretch) {
+    return std::any_of(
+        stretch.begin(), stretch.end(), [&](std::size_t i) { return r.closed.contains(i); });
+  });
+  const auto& counts = r.statistics;
+  const auto number = [](std::uint64_t count) { return static_cast<unsigned long>(count); };
+  std::printf("| %u, %s | %.2f | %.3f | %ld of %zu | %lu, %lu | %d | %.2f m %.2f deg | ",
+              seed,
+              by,
+              r.odometry_m,
+              r.ate_m,
+              static_cast<long>(closed),
+              stretches.size(),
+              number(counts.loops),
+              number(counts.surface_loops),
+              r.false_loops,
+              r.worst_loop_m,
+              r.worst_loop_deg);
+  std::printf("%lu, %lu, %d | %.2f / %.2f m, %.1f / %.1f | %lu, %lu, %lu | ",
+              number(counts.surfaces_compared),
+              number(counts.surfaces_confirmed),
+              r.wrong_surfaces,
+              quantile(r.surface_error_m, 0.5),
+              quantile(r.surface_error_m, 1.0),
+              quantile(r.surface_sigma, 0.5),
+              quantile(r.surface_sigma, 1.0),
+              number(counts.implausible),
+              number(counts.ambiguous),
+              number(counts.loops_left_out));
+  std::printf("%.1f / %.1f | %.1f / %.1f | %.1f / %.1f | %.0f |\n",
+              quantile(r.detect_ms, 0.5),
+              quantile(r.detect_ms, 1.0),
+              quantile(r.verify_ms, 0.5),
+              quantile(r.verify_ms, 1.0),
+              quantile(r.keyframe_ms, 0.5),
+              quantile(r.keyframe_ms, 1.0),
+              quantile(r.solve_ms, 1.0));
+}
+
 void report(const Drive& drive, unsigned seeds) {
   const auto stretches = revisits(drive);
-  std::size_t revisited = 0;
-  for (const auto& s : stretches) revisited += s.size();
-  std::printf("%zu keyframes, %zu same-direction revisits of at least 20 m (%zu keyframes)\n\n",
+  std::printf("%zu keyframes, %zu same-direction revisits of at least 20 m\n\n",
               drive.frames.size(),
-              stretches.size(),
-              revisited);
+              stretches.size());
   std::puts(
-      "| odometry seed | ATE odometry m | ATE m | revisits closed | keyframes with loop | loops | "
-      "false | worst loop | implausible, ambiguous, left out | detect ms, median / max | verify ms "
-      "| keyframe ms in all | pose graph ms, max |\n| --- | --- | --- | --- | --- | --- | --- | "
-      "--- "
-      "| --- | --- | --- | --- | "
-      "--- |");
+      "| odometry seed | ATE odometry m | ATE m | revisits closed | loops, by surfaces | false | "
+      "worst loop | surfaces compared, confirmed, wrong | their error, median / max, in sigma | "
+      "implausible, ambiguous, left out | detect ms, median / max | verify ms | keyframe ms in all "
+      "| pose graph ms, max |\n| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | "
+      "--- | --- | --- |");
   for (unsigned seed = 1; seed <= seeds; ++seed) {
-    const auto r = run(drive, seed);
-    std::size_t closed = 0;
-    for (const auto& s : stretches)
-      closed += std::any_of(s.begin(), s.end(), [&](std::size_t i) { return r.closed.contains(i); })
-                    ? 1
-                    : 0;
-    std::printf(
-        "| %u | %.2f | %.3f | %zu of %zu | %zu | %lu | %d | %.2f m %.2f deg | %lu, %lu, %lu | %.1f "
-        "/ %.1f | %.1f / %.1f | %.1f / %.1f | %.0f |\n",
-        seed,
-        r.odometry_m,
-        r.ate_m,
-        closed,
-        stretches.size(),
-        r.closed.size(),
-        static_cast<unsigned long>(r.statistics.loops),
-        r.false_loops,
-        r.worst_loop_m,
-        r.worst_loop_deg,
-        static_cast<unsigned long>(r.statistics.implausible),
-        static_cast<unsigned long>(r.statistics.ambiguous),
-        static_cast<unsigned long>(r.statistics.loops_left_out),
-        quantile(r.detect_ms, 0.5),
-        quantile(r.detect_ms, 1.0),
-        quantile(r.verify_ms, 0.5),
-        quantile(r.verify_ms, 1.0),
-        quantile(r.keyframe_ms, 0.5),
-        quantile(r.keyframe_ms, 1.0),
-        quantile(r.solve_ms, 1.0));
+    print_row(seed, "images", run(drive, seed, false), stretches);
+    print_row(seed, "surfaces too", run(drive, seed, true), stretches);
   }
 }
 
@@ -225,10 +264,11 @@ void report(const Drive& drive, unsigned seeds) {
 }  // namespace camvox::bench
 
 int main(int argc, char** argv) {
-  if (argc < 3) return std::puts("usage: drive_bench PRESET CACHE_FOLDER [RATE_HZ] [SEEDS]"), 1;
-  const std::string preset = argv[1];
+  if (argc < 3) return std::puts("usage: drive_bench WORLD CACHE_FOLDER [RATE_HZ] [SEEDS]"), 1;
+  const std::string world = argv[1];
   const double rate_hz = argc > 3 ? std::atof(argv[3]) : 2.0;
-  const auto cache = std::filesystem::path(argv[2]) / (preset + ".keyframes");
-  const auto drive = camvox::bench::Drive::make(camvox::simulation::preset(preset), rate_hz, cache);
+  const auto cache = std::filesystem::path(argv[2]) / (world + ".keyframes");
+  const auto spec = camvox::bench::ThereAndBack::make(world);
+  const auto drive = camvox::bench::Drive::make(spec.options, rate_hz, cache, spec.trajectory);
   camvox::bench::report(drive, argc > 4 ? static_cast<unsigned>(std::atoi(argv[4])) : 5);
 }

@@ -65,8 +65,7 @@ void ask(const RedKitchen& scene,
   for (std::size_t i = start; i < end; i += kFramesPerRequest) {
     const auto frame = std::make_shared<features::FrameFeatures>(scene.frames[i].features);
     const double before_s = thread_processor_time_s();
-    const auto places =
-        loop::verify(closer.detect_lost(frame), scene.camera, closer.config().verification);
+    const auto places = loop::verify(closer.detect_lost(frame), scene.camera, closer.config());
     const auto answer = closer.relocalise(places);
     outcome.request_ms.push_back(1e3 * (thread_processor_time_s() - before_s));
     for (const auto& place : places) {

@@ -8,11 +8,11 @@
 
 #include "camvox/component/progress.hpp"
 #include "camvox/loop/loop_closer.hpp"
+#include "camvox/loop/surface_registration.hpp"
+#include "camvox/loop/surroundings.hpp"
 #include "drive.hpp"
 #include "reverse/points.hpp"
 #include "reverse/ring_descriptor.hpp"
-#include "reverse/surface_registration.hpp"
-#include "reverse/surroundings.hpp"
 #include "reverse/there_and_back.hpp"
 
 /// Places seen again in the other direction: what the images say, and what the surfaces say that
@@ -24,6 +24,12 @@ namespace camvox::bench {
 namespace {
 
 using geometry::SE3;
+using loop::Registration;
+using loop::RegistrationStart;
+using loop::RegistrationStatus;
+using loop::SurfaceMap;
+using loop::SurfaceView;
+using loop::SurroundingsConfig;
 
 constexpr double kRate_hz = 2.0;   ///< Of the keyframes.
 constexpr double kPlaces_m = 3.0;  ///< Distance between places along the path.
@@ -98,7 +104,7 @@ class Path {
       if (k == frame) centre = views.size();
       views.push_back({points[k], odometry_[frame].inverse() * odometry_[k]});
     }
-    const auto around = gather(views, centre, config);
+    const auto around = loop::gather(views, centre, config);
     return {frame,
             path_m_[frame],
             around.T_place_level,
@@ -304,7 +310,7 @@ void report_images(const char* world, const Drive& drive, const Path& path) {
     }
     if (!seen[0] && !seen[1]) continue;
     for (const auto& place :
-         loop::verify(closer.detect(keyframe.id), drive.camera, closer.config().verification)) {
+         loop::verify(closer.detect(keyframe.id), drive.camera, closer.config())) {
       if (place.verification.status != loop::VerificationStatus::kOk) continue;
       found[path.relation(place.match_id - 1, i).turn_rad > 1.57 ? 1 : 0] = true;
     }

@@ -97,8 +97,8 @@ class Soak {
     if (!report.inserted) throw std::runtime_error("keyframe refused: " + report.problem);
     closer_.insert(keyframe);
     tell();
-    const auto places = loop::verify(
-        closer_.detect(keyframe.id), world_.camera().pinhole, closer_.config().verification);
+    const auto places =
+        loop::verify(closer_.detect(keyframe.id), world_.camera().pinhole, closer_.config());
     const auto task = closer_.consider(keyframe.id, places);
     if (!task) return;
     const auto correction = loop::correct(*task);
@@ -130,8 +130,8 @@ class Soak {
   void find(const tracking::Keyframe& request) {
     const auto task =
         closer_.detect_lost(std::make_shared<features::FrameFeatures>(request.features));
-    const auto found = closer_.relocalise(
-        loop::verify(task, world_.camera().pinhole, closer_.config().verification));
+    const auto found =
+        closer_.relocalise(loop::verify(task, world_.camera().pinhole, closer_.config()));
     if (!found) return tracker_.relocalisation_failed(request.frame_id);
     tracker_.relocalise(
         {request.frame_id, mapper_.epoch(), found->keyframe_ids.front(), found->T_map_camera});

@@ -8,6 +8,7 @@
 #include "camvox/conversion/map_messages.hpp"
 #include "camvox/conversion/pose.hpp"
 #include "camvox/test/feature_world.hpp"
+#include "camvox/test/there_and_back.hpp"
 
 namespace camvox {
 namespace {
@@ -116,6 +117,7 @@ TEST_F(LoopClosingComponentTest, AnswersEveryKeyframeAndClosesTheLoop) {
   ASSERT_NE(loop, nullptr);
   EXPECT_GT(loop->query_keyframe_id(), kRound - 8);  // the beginning is seen from afar
   EXPECT_LT(loop->match_keyframe_id(), 15U);
+  EXPECT_EQ(loop->by_surfaces(), 0);
   EXPECT_EQ(loop->keyframe_ids_count(), loop->query_keyframe_id());
   const auto T = conversion::to_se3(loop->T_match_query());
   const SE3 T_true =
@@ -196,6 +198,38 @@ TEST_F(LoopClosingComponentTest, RelocalisesInALoadedMap) {
   auto lost = keyframe(12);
   send_keyframe("relocalisation_request", lost);
   EXPECT_EQ(fake_.published<RelocalisationAnswer>("relocalisation_answer").at(0)->found(), 1);
+}
+
+// Its ends show nothing in common; mapping must know, or it would look for what to fuse.
+TEST_F(LoopClosingComponentTest, ClosesAWayBackBySurfaces) {
+  using test::ThereAndBack;
+  make(true);
+  ThereAndBack world(test::SurfaceScene::street(ThereAndBack::kLength_m));
+  for (std::size_t i = 0; i < ThereAndBack::kKeyframes && first_loop() == nullptr; ++i) {
+    const auto next = world.keyframe(i, last_);
+    last_ = next.T_map_camera;
+    send_keyframe("keyframe", next);
+    fake_.send<MapUpdate>("map_update", [&](MapUpdate& message) {
+      message.header().frame_id(next.frame_id);
+      message.keyframe_ids()[0] = next.id;
+      message.keyframe_poses()[0] = conversion::to_array(next.T_map_camera);
+      message.keyframe_ids_count(1);
+      message.keyframe_poses_count(1);
+      std::uint32_t edges = 0;
+      for (std::size_t k = ThereAndBack::first_neighbour(i); k < i; ++k) {
+        message.edges()[edges++] = {k + 1, next.id, 50};
+      }
+      message.edges_count(edges);
+    });
+  }
+  const auto loop = first_loop();
+  ASSERT_NE(loop, nullptr);
+  EXPECT_EQ(loop->by_surfaces(), 1);
+  const auto T_true = ThereAndBack::truth(loop->match_keyframe_id() - 1).inverse() *
+                      ThereAndBack::truth(loop->query_keyframe_id() - 1);
+  const auto error = geometry::local(T_true, conversion::to_se3(loop->T_match_query()));
+  EXPECT_LT(error.tail<3>().norm(), 0.3);
+  EXPECT_LT(error.head<3>().norm(), 0.02);
 }
 
 TEST_F(LoopClosingComponentTest, RefusesAWrongConfig) {

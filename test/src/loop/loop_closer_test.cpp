@@ -42,8 +42,7 @@ class LoopCloserTest : public testing::Test {
     last_ = i;
     poses_.push_back(keyframe.T_map_camera);
     closer_.insert(keyframe);
-    const auto places =
-        verify(closer_.detect(keyframe.id), world_.camera, closer_.config().verification);
+    const auto places = verify(closer_.detect(keyframe.id), world_.camera, closer_.config());
     const auto task = closer_.consider(keyframe.id, places);
     if (task) apply(correct(*task));
   }
@@ -107,8 +106,8 @@ TEST_F(LoopCloserTest, RelocalisesAnywhere) {
   for (const std::size_t i : {5U, 37U, 91U}) {
     const SE3 T = truth(i) * SE3(geometry::SO3::exp({0.0, 0.1, 0.0}), {0.3, 0.1, 0.0});
     const auto frame = std::make_shared<features::FrameFeatures>(world_.look(T, 12.0));
-    const auto answer = closer_.relocalise(
-        verify(closer_.detect_lost(frame), world_.camera, closer_.config().verification));
+    const auto answer =
+        closer_.relocalise(verify(closer_.detect_lost(frame), world_.camera, closer_.config()));
     ASSERT_TRUE(answer);
     const auto* keyframe = closer_.map().find(answer->keyframe_ids.front());
     ASSERT_NE(keyframe, nullptr);
@@ -126,8 +125,8 @@ TEST_F(LoopCloserTest, DoesNotGuessBetweenTwins) {
   world_ = twins;
   for (std::size_t i = 0; i < 70; ++i) drive_to(i);
   const auto frame = std::make_shared<features::FrameFeatures>(world_.look(truth(1), 12.0));
-  EXPECT_FALSE(closer_.relocalise(
-      verify(closer_.detect_lost(frame), world_.camera, closer_.config().verification)));
+  EXPECT_FALSE(
+      closer_.relocalise(verify(closer_.detect_lost(frame), world_.camera, closer_.config())));
 }
 
 TEST_F(LoopCloserTest, ForgetsRemovedKeyframes) {
@@ -149,9 +148,7 @@ TEST_F(LoopCloserTest, VerifiesOnePlaceOnce) {
       closer_.detect_lost(std::make_shared<features::FrameFeatures>(world_.look(truth(20), 12.0)));
   ASSERT_GE(task.candidates.size(), 1U);
   task.candidates = {task.candidates[0], task.candidates[0]};
-  const auto count = [&] {
-    return verify(task, world_.camera, closer_.config().verification).size();
-  };
+  const auto count = [&] { return verify(task, world_.camera, closer_.config()).size(); };
   EXPECT_EQ(count(), 2U);
   task.same_place_m = 10.0;
   EXPECT_EQ(count(), 1U);

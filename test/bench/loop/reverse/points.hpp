@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "../drive.hpp"
-#include "surroundings.hpp"
+#include "camvox/loop/surroundings.hpp"
 #include "there_and_back.hpp"
 
 namespace camvox::bench {
@@ -64,7 +64,7 @@ class LidarPoints {
       };
       add(*scan, time_s, T_camera_lidar, points[keyframe]);
     }
-    for (auto& own : points) own = thin(own, 0.15);
+    for (auto& own : points) own = loop::thin(own, 0.15);
     write(cache, points);
     return points;
   }

@@ -39,6 +39,13 @@ class FeatureWorld {
     }
   }
 
+  /// These points.
+  void add_points(const std::vector<Eigen::Vector3d>& points_world) {
+    for (const auto& p_world : points_world) {
+      points_.push_back({p_world, random_descriptor(random_)});
+    }
+  }
+
   /// The points again, moved: a place that looks the same.
   void add_copy(std::size_t first, std::size_t last, const geometry::SE3& T_copy_original) {
     for (std::size_t i = first; i < last; ++i) {
@@ -47,8 +54,11 @@ class FeatureWorld {
   }
 
   /// What a camera sees within `range_m`: half a pixel of noise, a tenth of the bits wrong, depth
-  /// with 2 cm of noise on four features of five.
-  features::FrameFeatures look(const geometry::SE3& T_world_camera, double range_m = 30.0) {
+  /// with 2 cm of noise on four features of five. `part` of the points is noticed, others each
+  /// time.
+  features::FrameFeatures look(const geometry::SE3& T_world_camera,
+                               double range_m = 30.0,
+                               double part = 1.0) {
     std::normal_distribution<double> unit;
     const geometry::SE3 T_camera_world = T_world_camera.inverse();
     features::FrameFeatures seen;
@@ -59,6 +69,7 @@ class FeatureWorld {
       const double v_px = camera.fy_px * p.y() / p.z() + camera.cy_px + 0.5 * unit(random_);
       if (u_px < 0.0 || v_px < 0.0 || u_px > 2.0 * camera.cx_px || v_px > 2.0 * camera.cy_px)
         continue;
+      if (part < 1.0 && static_cast<double>(random_() % 1000) >= 1000.0 * part) continue;
       const Eigen::Vector2f u(static_cast<float>(u_px), static_cast<float>(v_px));
       const bool has_depth = random_() % 5 != 0;
       seen.key_points.push_back({u.x(), u.y(), 0.0F, static_cast<float>(random_() % 100), 0});

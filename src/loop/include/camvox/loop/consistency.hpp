@@ -47,6 +47,7 @@ struct LoopMeasurement {
   geometry::SE3 T_match_query;
   geometry::Matrix6d covariance_query = geometry::Matrix6d::Identity();
   int inliers = 0;
+  bool by_surfaces = false;  ///< Not by images: the two share nothing that could be fused.
 };
 
 /// Two measurements, and how the map relates their ends.

@@ -13,6 +13,7 @@
 #include "camvox/loop/geometric_verification.hpp"
 #include "camvox/loop/map_replica.hpp"
 #include "camvox/loop/place_index.hpp"
+#include "camvox/loop/surface_places.hpp"
 #include "camvox/optimization/pose_graph.hpp"
 
 namespace camvox::loop {
@@ -34,6 +35,7 @@ struct LoopCloserConfig {
   double same_pose_deg = 5.0;     ///< The same, rotation.
   PlaceIndexConfig index;
   VerificationConfig verification;
+  SurfacePlacesConfig surfaces;
   DriftConfig drift;
   optimization::PoseGraphConfig pose_graph;
 
@@ -54,6 +56,7 @@ struct LoopCloserConfig {
     field("same_pose_deg", self.same_pose_deg, config::greater_than(0.0));
     field("index", self.index);
     field("verification", self.verification);
+    field("surfaces", self.surfaces);
     field("drift", self.drift);
     field("pose_graph", self.pose_graph);
   }
@@ -72,12 +75,16 @@ struct VerificationTask {
   std::shared_ptr<const features::FrameFeatures> query;
   std::vector<Candidate> candidates;
   double same_place_m = 0.0;  ///< Candidates nearer to one that was confirmed are not verified.
+  std::optional<SurfaceTask> surfaces;  ///< Compared when no candidate is confirmed.
+
+  [[nodiscard]] bool empty() const { return candidates.empty() && !surfaces; }
 };
 
 struct VerifiedPlace {
   KeyframeId match_id = 0;
   double score = 0.0;
   Verification verification;
+  bool by_surfaces = false;
 };
 
 /// A pose graph to solve on another thread, and what it is for.
@@ -113,8 +120,11 @@ struct LoopStatistics {
   std::uint64_t places_confirmed = 0;  ///< Passed the geometric layers.
   std::uint64_t implausible = 0;       ///< Too far from where the map can be wrong.
   std::uint64_t ambiguous = 0;         ///< Two different places fit.
-  std::uint64_t loops = 0;             ///< Measurements accepted into the pose graph.
-  std::uint64_t loops_left_out = 0;    ///< Taken out by the pose graph.
+  std::uint64_t surfaces_compared = 0;
+  std::uint64_t surfaces_confirmed = 0;  ///< Distinct and certain.
+  std::uint64_t surface_loops = 0;       ///< Of the loops.
+  std::uint64_t loops = 0;               ///< Measurements accepted into the pose graph.
+  std::uint64_t loops_left_out = 0;      ///< Taken out by the pose graph.
   std::uint64_t corrections = 0;
 };
 
@@ -126,7 +136,7 @@ struct LoopStatistics {
 /// arguments) to another thread:
 ///
 ///     closer.insert(keyframe);
-///     const auto places = verify(closer.detect(keyframe.id), camera, config.verification);
+///     const auto places = verify(closer.detect(keyframe.id), camera, config);
 ///     if (const auto task = closer.consider(keyframe.id, places)) {
 ///       closer.finish(correct(*task));
 ///     }
@@ -134,7 +144,9 @@ struct LoopStatistics {
 /// One false loop must not bend the map. The layers: appearance relative to the query's
 /// neighbours; geometric verification; plausibility against the drift along the path; no two
 /// different places may fit; several keyframes must agree pairwise (maximum clique); a robust
-/// kernel and rejection in the pose graph. Deterministic; not thread-safe.
+/// kernel and rejection in the pose graph. Where a place was passed in another direction, images
+/// show nothing in common: there the surfaces around it stand in for appearance and geometric
+/// verification. Deterministic; not thread-safe.
 class LoopCloser {
  public:
   /// Throws config::ConfigError.
@@ -176,6 +188,8 @@ class LoopCloser {
       KeyframeId id, const std::vector<VerifiedPlace>& places);
   [[nodiscard]] std::vector<LoopMeasurement> agreeing(const LoopMeasurement& newest) const;
   [[nodiscard]] bool agree(const LoopMeasurement& a, const LoopMeasurement& b) const;
+  void accept(const std::vector<LoopMeasurement>& set);
+  [[nodiscard]] bool says_something_new(const LoopMeasurement& loop) const;
   [[nodiscard]] bool due(const LoopMeasurement& newest) const;
   void forget_old(KeyframeId newest);
   [[nodiscard]] CorrectionTask correction_task(const LoopMeasurement& newest) const;
@@ -196,7 +210,7 @@ class LoopCloser {
 /// only say the same; those that fail are included with their status.
 [[nodiscard]] std::vector<VerifiedPlace> verify(const VerificationTask& task,
                                                 const optimization::PinholeCamera& camera,
-                                                const VerificationConfig& config);
+                                                const LoopCloserConfig& config);
 
 /// Solves the pose graph of a task.
 [[nodiscard]] Correction correct(const CorrectionTask& task);

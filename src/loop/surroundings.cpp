@@ -1,10 +1,10 @@
-#include "surroundings.hpp"
+#include "camvox/loop/surroundings.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 
-namespace camvox::bench {
+namespace camvox::loop {
 namespace {
 
 using Eigen::Vector3d;
@@ -82,4 +82,4 @@ Surroundings gather(std::span<const SurfaceView> views,
   return around;
 }
 
-}  // namespace camvox::bench
+}  // namespace camvox::loop

@@ -1,12 +1,12 @@
+#include "camvox/loop/surface_map.hpp"
+
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <bit>
 #include <cmath>
 #include <map>
 
-#include "surface_registration.hpp"
-
-namespace camvox::bench {
+namespace camvox::loop {
 namespace {
 
 using Eigen::Vector3f;
@@ -54,43 +54,52 @@ std::size_t SurfaceMap::cell(const Vector3i& index) const {
   return (at.x() * size.y() + at.y()) * size.z() + at.z();
 }
 
-/// Calls `use` with every surface within kNear_m, and the vector to it.
+/// Calls `use` with every surface within `radius_m` and the vector to it, until it returns true.
 template <typename Use>
-void SurfaceMap::for_near(const Vector3f& point, Use use) const {
-  const Vector3i low = (index_of(point) - Vector3i::Ones()).cwiseMax(0);
-  const Vector3i high = (index_of(point) + Vector3i::Ones()).cwiseMin(size_ - Vector3i::Ones());
-  if ((low.array() > high.array()).any()) return;
+bool SurfaceMap::for_near(const Vector3f& point, float radius_m, Use use) const {
+  const Vector3f reach = Vector3f::Constant(radius_m);
+  const Vector3i low = index_of(point - reach).cwiseMax(0);
+  const Vector3i high = index_of(point + reach).cwiseMin(size_ - Vector3i::Ones());
+  if ((low.array() > high.array()).any()) return false;
   for (int x = low.x(); x <= high.x(); ++x) {
     for (int y = low.y(); y <= high.y(); ++y) {
       // Cells above each other follow each other.
       const auto last = begin_[cell({x, y, high.z()}) + 1];
       for (auto i = begin_[cell({x, y, low.z()})]; i < last; ++i) {
         const Vector3f d = surfaces_[i].point - point;
-        if (d.squaredNorm() < kNear_m * kNear_m) use(surfaces_[i], d);
+        if (d.squaredNorm() < radius_m * radius_m && use(surfaces_[i], d)) return true;
       }
     }
   }
+  return false;
 }
 
 const SurfaceMap::Surface* SurfaceMap::nearest(const Vector3f& point) const {
   const Surface* best = nullptr;
   float best_m2 = kNear_m * kNear_m;
-  for_near(point, [&](const Surface& surface, const Vector3f& d) {
-    if (d.squaredNorm() >= best_m2) return;
-    best_m2 = d.squaredNorm();
-    best = &surface;
+  for_near(point, kNear_m, [&](const Surface& surface, const Vector3f& d) {
+    if (d.squaredNorm() < best_m2) {
+      best_m2 = d.squaredNorm();
+      best = &surface;
+    }
+    return false;
   });
   return best;
+}
+
+bool SurfaceMap::has_within(const Vector3f& point, float radius_m) const {
+  return for_near(point, radius_m, [](const Surface&, const Vector3f&) { return true; });
 }
 
 Vector3f SurfaceMap::normal_at(const Vector3f& point) const {
   Vector3f sum = Vector3f::Zero();
   Eigen::Matrix3f squares = Eigen::Matrix3f::Zero();
   int count = 0;
-  for_near(point, [&](const Surface& /*surface*/, const Vector3f& d) {
+  for_near(point, kNear_m, [&](const Surface& /*surface*/, const Vector3f& d) {
     sum += d;
     squares += d * d.transpose();
     ++count;
+    return false;
   });
   if (count < kMinNeighbours) return Vector3f::Zero();
   const auto n = static_cast<float>(count);
@@ -119,4 +128,4 @@ void SurfaceMap::find_upright() {
   }
 }
 
-}  // namespace camvox::bench
+}  // namespace camvox::loop

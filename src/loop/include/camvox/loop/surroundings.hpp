@@ -4,16 +4,25 @@
 #include <span>
 #include <vector>
 
+#include "camvox/config/parameters.hpp"
 #include "camvox/geometry/se3.hpp"
 
-namespace camvox::bench {
+namespace camvox::loop {
 
-/// Tuning of gather().
+/// Tuning of gather(). YAML keys are the field names.
 struct SurroundingsConfig {
   double reach_m = 25.0;      ///< Path before and after a place that is looked around from.
   double max_range_m = 20.0;  ///< Surfaces farther from the place are left out.
   double max_height_m = 6.0;  ///< The same, above the camera.
   double grain_m = 0.3;       ///< One point stands for all that fall in a cube of this size.
+
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& field) {
+    field("reach_m", self.reach_m, config::greater_than(0.0));
+    field("max_range_m", self.max_range_m, config::at_least(5.0), config::at_most(60.0));
+    field("max_height_m", self.max_height_m, config::greater_than(0.0));
+    field("grain_m", self.grain_m, config::at_least(0.05), config::at_most(2.0));
+  }
 };
 
 /// Points on surfaces that were measured from one pose.
@@ -40,4 +49,4 @@ struct Surroundings {
 [[nodiscard]] std::vector<Eigen::Vector3f> thin(std::span<const Eigen::Vector3f> points,
                                                 double grain_m);
 
-}  // namespace camvox::bench
+}  // namespace camvox::loop

@@ -1,4 +1,4 @@
-#include "surface_registration.hpp"
+#include "camvox/loop/surface_registration.hpp"
 
 #include <Eigen/Cholesky>
 #include <algorithm>
@@ -6,8 +6,9 @@
 #include <cmath>
 #include <numbers>
 #include <optional>
+#include <tuple>
 
-namespace camvox::bench {
+namespace camvox::loop {
 namespace {
 
 using Eigen::Vector2f;
@@ -19,6 +20,7 @@ using geometry::Vector6d;
 constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 constexpr std::size_t kMinUpright = 20;
 constexpr int kMinPoints = 100;
+constexpr double kApart_m = 1.0;  ///< So far from each other, two poses are different ones.
 
 /// Where something stands upright, spread a little, seen from above.
 class UprightGrid {
@@ -71,7 +73,6 @@ std::vector<Start> search(const SurfaceMap& source,
                           const RegistrationStart& start,
                           std::size_t count) {
   constexpr double kYawStep_rad = 3.0 * kRadPerDeg;
-  constexpr double kApart_m = 1.0;
   const UprightGrid grid(target.upright());
   const int steps = static_cast<int>(std::ceil(start.search_m / SurfaceMap::kCell_m));
   const int turns = static_cast<int>(std::ceil(start.search_yaw_rad / kYawStep_rad));
@@ -177,9 +178,7 @@ class Matching {
     for (const auto& surface : source_.surfaces()) {
       if (!surface.rough() || surface.point.z() < SurfaceMap::kLowest_m) continue;
       ++all;
-      const Vector3f p = R * surface.point + t;
-      const auto* near = target_.nearest(p);
-      coincide += near != nullptr && (near->point - p).norm() < kBeside_m ? 1 : 0;
+      coincide += target_.has_within(R * surface.point + t, kBeside_m) ? 1 : 0;
     }
     return all > 0 ? static_cast<double>(coincide) / all : 0.0;
   }
@@ -188,11 +187,11 @@ class Matching {
   [[nodiscard]] double distinction(const SE3& T_target_source) const {
     constexpr double kBeside_m = 1.5;
     constexpr int kDirections = 8;
-    double beside = 0.0;
+    double beside = 0.0;  // a kerb coincides with itself when it is moved along
     for (int i = 0; i < kDirections; ++i) {
       const double angle = 2.0 * std::numbers::pi * i / kDirections;
       const Eigen::Vector3d shift(kBeside_m * std::cos(angle), kBeside_m * std::sin(angle), 0.0);
-      beside += coincidence(SE3(geometry::SO3(), shift) * T_target_source) / kDirections;
+      beside = std::max(beside, coincidence(SE3(geometry::SO3(), shift) * T_target_source));
     }
     return coincidence(T_target_source) - beside;
   }
@@ -213,7 +212,8 @@ RegistrationStatus judge(const Registration& result, const RegistrationConfig& c
   const auto sigma = [&](int first) {
     return std::sqrt(result.covariance_source.diagonal().segment<3>(first).maxCoeff());
   };
-  if (result.distinction < config.min_distinction) return RegistrationStatus::kNotDistinct;
+  const double needed = std::max(config.min_distinction, result.runner_up / config.max_runner_up);
+  if (result.distinction < needed) return RegistrationStatus::kNotDistinct;
   const bool certain = sigma(0) < config.max_rotation_sigma_deg * kRadPerDeg &&
                        sigma(3) < config.max_translation_sigma_m;
   return certain ? RegistrationStatus::kOk : RegistrationStatus::kUncertain;
@@ -229,17 +229,22 @@ Registration register_surfaces(const SurfaceMap& source,
   if (source.upright().size() < kMinUpright || target.upright().size() < kMinUpright) return result;
   const Matching there(source, target, config);
   const Matching back(target, source, config);
-  bool found = false;
+  std::vector<std::pair<double, SE3>> refined;
   for (const auto& from : search(source, target, start, static_cast<std::size_t>(config.starts))) {
     const auto T = there.refine(from.T_target_source);
     if (!T) continue;
-    const double distinction = 0.5 * (there.distinction(*T) + back.distinction(T->inverse()));
-    if (found && distinction <= result.distinction) continue;
-    found = true;
-    result.distinction = distinction;
-    result.T_target_source = *T;
+    refined.emplace_back(0.5 * (there.distinction(*T) + back.distinction(T->inverse())), *T);
   }
-  if (!found) return result;
+  if (refined.empty()) return result;
+  std::stable_sort(refined.begin(), refined.end(), [](const auto& a, const auto& b) {
+    return a.first > b.first;
+  });
+  std::tie(result.distinction, result.T_target_source) = refined.front();
+  for (const auto& [distinction, T] : refined) {
+    const auto apart = geometry::local(result.T_target_source, T);
+    if (apart.tail<3>().norm() < kApart_m) continue;
+    result.runner_up = std::max(result.runner_up, distinction);
+  }
   constexpr double kWiden = 2.0;
   const auto equations = there.linearise(result.T_target_source, kWiden);
   result.points = equations.points;
@@ -249,4 +254,4 @@ Registration register_surfaces(const SurfaceMap& source,
   return result;
 }
 
-}  // namespace camvox::bench
+}  // namespace camvox::loop
