@@ -188,6 +188,7 @@ void MappingComponent::on_correction(const LoopCorrection& correction) {
     proposal.map_epoch = correction.map_epoch();
     proposal.query = correction.query_keyframe_id();
     proposal.match = correction.match_keyframe_id();
+    proposal.by_surfaces = correction.by_surfaces() != 0;
     for (std::uint32_t i = 0; i < correction.keyframe_ids_count(); ++i) {
       proposal.poses[correction.keyframe_ids()[i]] =
           conversion::to_se3(correction.keyframe_poses()[i]);
@@ -195,9 +196,10 @@ void MappingComponent::on_correction(const LoopCorrection& correction) {
     if (const auto problem = mapper_.correct(proposal); !problem.empty()) {
       context_.log().warn("loop correction not applied: {}", problem);
     } else {
-      context_.log().info("loop from keyframe {} to {} closed, map epoch {}",
+      context_.log().info("loop from keyframe {} to {} closed{}, map epoch {}",
                           proposal.query,
                           proposal.match,
+                          proposal.by_surfaces ? " by surfaces" : "",
                           mapper_.epoch());
       full_due_ = config_.mapping.full_bundle_iterations > 0;
       if (config_.lockstep && full_due_) {

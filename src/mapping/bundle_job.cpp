@@ -124,15 +124,22 @@ BundleJob make_local_job(const Map& map, const ObservationModel& model, Keyframe
   return job;
 }
 
-BundleJob make_full_job(const Map& map, const ObservationModel& model) {
+BundleJob make_full_job(const Map& map,
+                        const ObservationModel& model,
+                        const std::set<KeyframeId>& held) {
   BundleJob job = empty_job(map, model);
   job.whole_map = true;
   job.config.second_iterations = model.config().full_bundle_iterations;
   if (map.keyframes().empty()) return job;
   std::vector<KeyframeId> all;
-  for (const auto& [id, keyframe] : map.keyframes()) all.push_back(id);
-  add_poses(job, map, {all.front()}, true);
-  add_poses(job, map, std::set<KeyframeId>(all.begin() + 1, all.end()), false);
+  std::set<KeyframeId> fixed;
+  std::set<KeyframeId> free;
+  for (const auto& [id, keyframe] : map.keyframes()) {
+    (all.empty() || held.contains(id) ? fixed : free).insert(id);
+    all.push_back(id);
+  }
+  add_poses(job, map, fixed, true);
+  add_poses(job, map, free, false);
   add_landmarks(job, map, model, shared_landmarks(map, all, map.landmark_count()));
   return job;
 }

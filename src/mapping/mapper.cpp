@@ -105,7 +105,9 @@ BundleJob Mapper::local_job(KeyframeId id) const {
 }
 
 BundleJob Mapper::full_job() const {
-  auto job = make_full_job(map_, model_);
+  std::set<KeyframeId> held;
+  for (const auto id : loop_ends_) held.insert(map_.anchor(id).keyframe);
+  auto job = make_full_job(map_, model_, held);
   job.map_epoch = epoch_;
   return job;
 }
@@ -174,7 +176,11 @@ std::string Mapper::correct(const LoopProposal& proposal) {
   const auto moved = move_keyframes(map_, poses, [](KeyframeId) { return true; });
   changed_.insert(moved.begin(), moved.end());
   ++epoch_;
-  fuse_across(query, match);
+  if (proposal.by_surfaces) {
+    loop_ends_.insert({query, match});
+  } else {
+    fuse_across(query, match);
+  }
   return {};
 }
 
@@ -229,6 +235,7 @@ void Mapper::restore(Map map, std::uint64_t epoch) {
   map_ = std::move(map);
   epoch_ = epoch;
   tracker_reference_ = 0;
+  loop_ends_.clear();
   changed_.clear();
   removed_.clear();
   changed_edges_.clear();

@@ -292,6 +292,32 @@ TEST(MapperTest, CorrectionMovesTheMapAndFusesTheDouble) {
   EXPECT_LT(worst_position_m(mapper, world), 0.02);
 }
 
+// Nothing but the correction ties the ends: left free, the landmarks between them would undo it.
+TEST(MapperTest, ALoopBySurfacesStaysClosed) {
+  MappingWorld world;
+  Mapper mapper = drive(world, 12);
+  const KeyframeId last = mapper.map().keyframes().rbegin()->first;
+  const std::size_t landmarks = mapper.map().landmark_count();
+  LoopProposal proposal{mapper.epoch(), last, 1, {}, true};
+  for (const auto& [id, keyframe] : mapper.map().keyframes()) {
+    const double part = static_cast<double>(id - 1) / static_cast<double>(last - 1);
+    proposal.poses[id] = SE3({}, {0.0, 0.2 * part, 0.0}) * keyframe.frame.T_map_camera;
+  }
+  const auto pose = [&](KeyframeId id) { return mapper.map().keyframe(id).frame.T_map_camera; };
+  const SE3 before = pose(last);
+  ASSERT_EQ(mapper.correct(proposal), "");
+  EXPECT_NEAR((pose(last).translation() - before.translation()).norm(), 0.2, 1e-9);
+  EXPECT_EQ(mapper.map().landmark_count(), landmarks);  // nothing to fuse
+  const SE3 end = pose(last);
+  const KeyframeId middle = std::next(mapper.map().keyframes().begin(), 3)->first;
+  const SE3 between = pose(middle);
+  auto job = mapper.full_job();
+  EXPECT_EQ(job.solve().fixed_poses, 2U);
+  ASSERT_TRUE(mapper.finish(job));
+  EXPECT_EQ(pose(last).matrix(), end.matrix());
+  EXPECT_GT((pose(middle).translation() - between.translation()).norm(), 1e-4);
+}
+
 TEST(MapperTest, RefusesCorrectionsThatDoNotFit) {
   MappingWorld world;
   Mapper mapper({}, world.camera());

@@ -33,8 +33,10 @@ struct BundleJob {
 [[nodiscard]] BundleJob make_local_job(const Map& map,
                                        const ObservationModel& model,
                                        KeyframeId id);
-/// Everything; the root holds it in place.
-[[nodiscard]] BundleJob make_full_job(const Map& map, const ObservationModel& model);
+/// Everything; the root holds it in place, and `held` (as far as they are in the map) stay.
+[[nodiscard]] BundleJob make_full_job(const Map& map,
+                                      const ObservationModel& model,
+                                      const std::set<KeyframeId>& held = {});
 
 /// Writes a solved job into the map: poses, positions, and outliers out. What is gone from the map
 /// since is passed over. Returns the keyframes that moved.

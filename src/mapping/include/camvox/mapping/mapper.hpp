@@ -33,7 +33,8 @@ struct LoopProposal {
   std::uint64_t map_epoch = 0;  ///< The epoch that it looked at.
   KeyframeId query = 0;
   KeyframeId match = 0;
-  KeyframePoses poses;  ///< Corrected, of the keyframes that it knew.
+  KeyframePoses poses;       ///< Corrected, of the keyframes that it knew.
+  bool by_surfaces = false;  ///< Query and match look elsewhere, they share no landmarks.
 };
 
 /// What became of a keyframe.
@@ -83,8 +84,9 @@ class Mapper {
   void set_reference(KeyframeId id) { tracker_reference_ = id; }
 
   /// Moves the corrected keyframes, those that came since with their parents, and landmarks with
-  /// their keyframes; fuses what is double around the loop; raises the epoch. Returns what is wrong
-  /// with the proposal, and then changes nothing; or "".
+  /// their keyframes; fuses what is double around the loop; raises the epoch. After a loop by
+  /// surfaces no landmarks tie its ends: full jobs leave these where the correction put them.
+  /// Returns what is wrong with the proposal, and then changes nothing; or "".
   std::string correct(const LoopProposal& proposal);
 
   [[nodiscard]] tracking::LocalMap local_map(std::uint64_t frame_id, KeyframeId reference) const;
@@ -113,6 +115,7 @@ class Mapper {
   Map map_;
   std::uint64_t epoch_ = 0;
   KeyframeId tracker_reference_ = 0;
+  std::set<KeyframeId> loop_ends_;  ///< Of loops by surfaces; some may have been culled since.
   std::set<KeyframeId> changed_;
   std::set<KeyframeId> removed_;
   std::set<std::pair<KeyframeId, KeyframeId>> changed_edges_;
