@@ -20,7 +20,9 @@ using geometry::Vector6d;
 constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 constexpr std::size_t kMinUpright = 20;
 constexpr int kMinPoints = 100;
-constexpr double kApart_m = 1.0;  ///< So far from each other, two poses are different ones.
+constexpr double kWiden = 2.0;      ///< In the end; see linearise().
+constexpr std::size_t kStride = 4;  ///< A quarter of the surfaces leads as near as all.
+constexpr double kApart_m = 1.0;    ///< So far from each other, two poses are different ones.
 
 /// Where something stands upright, spread a little, seen from above.
 class UprightGrid {
@@ -121,52 +123,13 @@ class Matching {
     int points = 0;
   };
 
-  /// `widen`: what is farther off than so many sigma hardly counts (Geman, McClure).
-  [[nodiscard]] Equations linearise(const SE3& T_target_source, double widen) const {
-    Equations sum;
-    const Eigen::Matrix3d R = T_target_source.rotation().matrix();
-    for (const auto& surface : source_.surfaces()) {
-      const Eigen::Vector3d p_source = surface.point.cast<double>();
-      const Eigen::Vector3d p = T_target_source * p_source;
-      const auto* near = target_.nearest(p.cast<float>());
-      if (near == nullptr || near->rough() != surface.rough()) continue;
-      const Eigen::Vector3d difference = p - near->point.cast<double>();
-      ++sum.points;
-      const auto add = [&](const Eigen::Vector3d& n_source, double r, double weight) {
-        Vector6d J;
-        J << p_source.cross(n_source), n_source;
-        sum.H.noalias() += weight * J * J.transpose();
-        sum.b.noalias() += weight * r * J;
-      };
-      if (surface.rough()) {
-        const double weight = robust(difference.norm(), config_.point_sigma_m, widen);
-        for (int axis = 0; axis < 3; ++axis) {
-          add(R.row(axis).transpose(), difference[axis], weight);
-        }
-      } else {
-        const Eigen::Vector3d n = near->normal.cast<double>();
-        const double r = n.dot(difference);
-        add(R.transpose() * n, r, robust(r, config_.plane_sigma_m, widen));
-      }
-    }
-    return sum;
-  }
+  /// From where the search got to.
+  [[nodiscard]] std::optional<SE3> approach(const SE3& T) const { return refine(T, 8.0, kStride); }
+  /// From where approach() got to.
+  [[nodiscard]] std::optional<SE3> finish(const SE3& T) const { return refine(T, kWiden, 1); }
 
-  [[nodiscard]] std::optional<SE3> refine(SE3 T) const {
-    double widen = 8.0;
-    for (int i = 0; i < config_.max_iterations; ++i) {
-      auto equations = linearise(T, widen);
-      if (equations.points < kMinPoints) return std::nullopt;
-      equations.H.diagonal().array() += 1e-3 * equations.points;  // where nothing holds
-      const Vector6d step = -equations.H.ldlt().solve(equations.b);
-      if (!step.allFinite()) return std::nullopt;
-      T = geometry::retract(T, step);
-      const bool stays = step.head<3>().norm() < 2e-4 && step.tail<3>().norm() < 2e-3;
-      if (stays && widen <= 2.0) break;
-      widen = std::max(0.7 * widen, 2.0);
-    }
-    return T;
-  }
+  /// Of the pose that was found.
+  [[nodiscard]] Equations equations(const SE3& T) const { return linearise(T, kWiden, 1); }
 
   /// Part of what is rough above the ground that has a point of the target beside it.
   [[nodiscard]] double coincidence(const SE3& T_target_source) const {
@@ -197,6 +160,56 @@ class Matching {
   }
 
  private:
+  /// `widen`: what is farther off than so many sigma hardly counts (Geman, McClure). Every
+  /// `stride`th surface counts.
+  [[nodiscard]] Equations linearise(const SE3& T_target_source,
+                                    double widen,
+                                    std::size_t stride) const {
+    Equations sum;
+    const Eigen::Matrix3d R = T_target_source.rotation().matrix();
+    for (std::size_t i = 0; i < source_.surfaces().size(); i += stride) {
+      const auto& surface = source_.surfaces()[i];
+      const Eigen::Vector3d p_source = surface.point.cast<double>();
+      const Eigen::Vector3d p = R * p_source + T_target_source.translation();
+      const auto* near = target_.nearest(p.cast<float>());
+      if (near == nullptr || near->rough() != surface.rough()) continue;
+      const Eigen::Vector3d difference = p - near->point.cast<double>();
+      ++sum.points;
+      const auto add = [&](const Eigen::Vector3d& n_source, double r, double weight) {
+        Vector6d J;
+        J << p_source.cross(n_source), n_source;
+        sum.H.noalias() += weight * J * J.transpose();
+        sum.b.noalias() += weight * r * J;
+      };
+      if (surface.rough()) {
+        const double weight = robust(difference.norm(), config_.point_sigma_m, widen);
+        for (int axis = 0; axis < 3; ++axis) {
+          add(R.row(axis).transpose(), difference[axis], weight);
+        }
+      } else {
+        const Eigen::Vector3d n = near->normal.cast<double>();
+        const double r = n.dot(difference);
+        add(R.transpose() * n, r, robust(r, config_.plane_sigma_m, widen));
+      }
+    }
+    return sum;
+  }
+
+  [[nodiscard]] std::optional<SE3> refine(SE3 T, double widen, std::size_t stride) const {
+    for (int i = 0; i < config_.max_iterations; ++i) {
+      auto equations = linearise(T, widen, stride);
+      if (equations.points * static_cast<int>(stride) < kMinPoints) return std::nullopt;
+      equations.H.diagonal().array() += 1e-3 * equations.points;  // where nothing holds
+      const Vector6d step = -equations.H.ldlt().solve(equations.b);
+      if (!step.allFinite()) return std::nullopt;
+      T = geometry::retract(T, step);
+      const bool stays = step.head<3>().norm() < 2e-4 && step.tail<3>().norm() < 2e-3;
+      if (stays && widen <= kWiden) break;
+      widen = std::max(0.7 * widen, kWiden);
+    }
+    return T;
+  }
+
   static double robust(double r, double sigma, double widen) {
     const double width2 = widen * widen * sigma * sigma;
     const double scale = width2 / (width2 + r * r);
@@ -231,7 +244,7 @@ Registration register_surfaces(const SurfaceMap& source,
   const Matching back(target, source, config);
   std::vector<std::pair<double, SE3>> refined;
   for (const auto& from : search(source, target, start, static_cast<std::size_t>(config.starts))) {
-    const auto T = there.refine(from.T_target_source);
+    const auto T = there.approach(from.T_target_source);
     if (!T) continue;
     refined.emplace_back(0.5 * (there.distinction(*T) + back.distinction(T->inverse())), *T);
   }
@@ -245,8 +258,8 @@ Registration register_surfaces(const SurfaceMap& source,
     if (apart.tail<3>().norm() < kApart_m) continue;
     result.runner_up = std::max(result.runner_up, distinction);
   }
-  constexpr double kWiden = 2.0;
-  const auto equations = there.linearise(result.T_target_source, kWiden);
+  if (const auto T = there.finish(result.T_target_source)) result.T_target_source = *T;
+  const auto equations = there.equations(result.T_target_source);
   result.points = equations.points;
   const Matrix6d H = equations.H + 1e-6 * Matrix6d::Identity();  // may hold some way not at all
   result.covariance_source = config.repeated_points * H.ldlt().solve(Matrix6d::Identity());

@@ -38,7 +38,7 @@ struct RegistrationConfig {
 enum class RegistrationStatus : std::uint8_t {
   kOk,
   kNothing,      ///< Too little stands there.
-  kNotDistinct,  ///< Things coincide hardly better than beside the pose: another place.
+  kNotDistinct,  ///< Things coincide hardly better than elsewhere: perhaps another place.
   kUncertain,    ///< The pose is not determined well enough, as along a corridor.
 };
 
