@@ -9,7 +9,7 @@ import tempfile
 import unittest
 
 sys.path.insert(0, str(pathlib.Path(__file__).parent))
-from split_run import Runs, TwoHosts, stamps, states  # noqa: E402
+from split_run import Runs, TwoHosts, log_of, stamps, states  # noqa: E402
 
 CAMVOX = sys.argv.pop(1)
 
@@ -48,7 +48,8 @@ class SplitRun(unittest.TestCase):
         self.assertGreaterEqual(counts.get("ok", 0) + 1, sum(counts.values()), counts)
         made = set(stamps(front / "keyframes.tum"))
         self.assertGreater(len(made), 2)
-        self.assertFalse(made - set(stamps(back / "keyframes.tum")), "keyframes are lacking")
+        logs = "".join(f"\n-- {side.name}:\n{log_of(side)[-4000:]}" for side in (front, back))
+        self.assertFalse(made - set(stamps(back / "keyframes.tum")), "keyframes are lacking" + logs)
         same = self.runs.compare(front / "keyframes.tum", back / "keyframes.tum")
         self.assertLess(same["ape_m"]["max"], 0.01)
 
