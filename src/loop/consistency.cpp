@@ -105,6 +105,11 @@ Matrix6d PoseSigma::covariance() const {
   return variance.asDiagonal();
 }
 
+PoseSigma largest_sigma(const Matrix6d& covariance) {
+  return {std::sqrt(covariance.diagonal().head<3>().maxCoeff()),
+          std::sqrt(covariance.diagonal().tail<3>().maxCoeff())};
+}
+
 PoseSigma path_sigma(double length_m, const DriftConfig& config) {
   return {kRadPerDeg * (config.base_sigma_deg + config.sigma_deg_per_m * length_m),
           config.base_sigma_m + config.sigma_m_per_m * length_m};

@@ -8,8 +8,10 @@
 #include <optional>
 #include <set>
 
+#include "back_projection.hpp"
 #include "camvox/features/feature_grid.hpp"
 #include "camvox/features/hamming.hpp"
+#include "camvox/loop/consistency.hpp"
 #include "camvox/optimization/pose_optimizer.hpp"
 #include "feature_matching.hpp"
 #include "rigid_ransac.hpp"
@@ -34,10 +36,6 @@ struct PlacePoint {
   int octave = 0;
   const features::Descriptor* descriptor = nullptr;
 };
-
-Eigen::Vector3d ray(const Eigen::Vector2f& u_px, const PinholeCamera& camera) {
-  return {(u_px.x() - camera.cx_px) / camera.fx_px, (u_px.y() - camera.cy_px) / camera.fy_px, 1.0};
-}
 
 PlacePoint place_point(const PlaceView& view, std::size_t feature, const PinholeCamera& camera) {
   const auto& features = *view.features;
@@ -254,11 +252,9 @@ class Verifier {
     if (result_.inliers < config_.min_inliers || result_.cells < config_.min_cells) {
       return fail(VerificationStatus::kTooFewInliers);
     }
-    const auto sigma = [&](int first) {
-      return std::sqrt(estimate.covariance_camera.diagonal().segment<3>(first).maxCoeff());
-    };
-    if (sigma(0) > config_.max_rotation_sigma_deg * std::numbers::pi / 180.0 ||
-        sigma(3) > config_.max_translation_sigma_m) {
+    const auto sigma = largest_sigma(estimate.covariance_camera);
+    if (sigma.rotation_rad > config_.max_rotation_sigma_deg * std::numbers::pi / 180.0 ||
+        sigma.translation_m > config_.max_translation_sigma_m) {
       return fail(VerificationStatus::kUncertain);
     }
     compare_depths();

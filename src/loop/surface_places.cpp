@@ -59,23 +59,6 @@ KeyframeId nearest_turned(const MapReplica& map,
   return 0;
 }
 
-/// What features with depth show of the surfaces around, in their camera.
-std::vector<Vector3f> surface_points(const features::FrameFeatures& features,
-                                     const optimization::PinholeCamera& camera,
-                                     double max_depth_m) {
-  std::vector<Vector3f> points;
-  for (std::size_t i = 0; i < features.size(); ++i) {
-    const double depth_m = features.depth_m[i];
-    if (!(depth_m > 0.0) || depth_m > max_depth_m) continue;
-    const Eigen::Vector2d u_px = features.undistorted_px[i].cast<double>();
-    points.push_back((depth_m * Vector3d((u_px.x() - camera.cx_px) / camera.fx_px,
-                                         (u_px.y() - camera.cy_px) / camera.fy_px,
-                                         1.0))
-                         .cast<float>());
-  }
-  return points;
-}
-
 Surroundings look_around(const SurfaceTask::Side& side,
                          const optimization::PinholeCamera& camera,
                          const SurfacePlacesConfig& config) {

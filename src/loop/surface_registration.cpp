@@ -8,6 +8,8 @@
 #include <optional>
 #include <tuple>
 
+#include "camvox/loop/consistency.hpp"
+
 namespace camvox::loop {
 namespace {
 
@@ -222,13 +224,11 @@ class Matching {
 };
 
 RegistrationStatus judge(const Registration& result, const RegistrationConfig& config) {
-  const auto sigma = [&](int first) {
-    return std::sqrt(result.covariance_source.diagonal().segment<3>(first).maxCoeff());
-  };
   const double needed = std::max(config.min_distinction, result.runner_up / config.max_runner_up);
   if (result.distinction < needed) return RegistrationStatus::kNotDistinct;
-  const bool certain = sigma(0) < config.max_rotation_sigma_deg * kRadPerDeg &&
-                       sigma(3) < config.max_translation_sigma_m;
+  const auto sigma = largest_sigma(result.covariance_source);
+  const bool certain = sigma.rotation_rad < config.max_rotation_sigma_deg * kRadPerDeg &&
+                       sigma.translation_m < config.max_translation_sigma_m;
   return certain ? RegistrationStatus::kOk : RegistrationStatus::kUncertain;
 }
 

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdint>
 
+#include "back_projection.hpp"
+
 namespace camvox::loop {
 namespace {
 
@@ -39,6 +41,18 @@ std::uint64_t cube(const Vector3f& point, float grain_m) {
 }
 
 }  // namespace
+
+std::vector<Vector3f> surface_points(const features::FrameFeatures& features,
+                                     const optimization::PinholeCamera& camera,
+                                     double max_depth_m) {
+  std::vector<Vector3f> points;
+  for (std::size_t i = 0; i < features.size(); ++i) {
+    const double depth_m = features.depth_m[i];
+    if (!(depth_m > 0.0) || depth_m > max_depth_m) continue;
+    points.push_back((depth_m * ray(features.undistorted_px[i], camera)).cast<float>());
+  }
+  return points;
+}
 
 std::vector<Vector3f> thin(std::span<const Vector3f> points, double grain_m) {
   std::vector<std::pair<std::uint64_t, std::uint32_t>> order;

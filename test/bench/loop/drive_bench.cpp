@@ -74,7 +74,7 @@ loop::MapChange neighbour_edges(const std::vector<tracking::Keyframe>& frames, s
   return change;
 }
 
-/// As all of this file calls a loop.
+/// Of a pose: whether a loop with it is a false one.
 bool is_false(const geometry::Vector6d& error) {
   return error.tail<3>().norm() > 0.5 || error.head<3>().norm() > 0.05;
 }

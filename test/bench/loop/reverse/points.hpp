@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "../drive.hpp"
+#include "camvox/loop/surface_places.hpp"
 #include "camvox/loop/surroundings.hpp"
 #include "there_and_back.hpp"
 
@@ -16,20 +17,10 @@ using Points = std::vector<std::vector<Eigen::Vector3f>>;
 
 /// What the map of a run holds anyway: the features of keyframes, where lidar gave them depth.
 inline Points feature_points(const Drive& drive) {
-  constexpr float kMaxDepth_m = 40.0F;
-  const auto& c = drive.camera;
   Points points;
   for (const auto& frame : drive.frames) {
-    auto& own = points.emplace_back();
-    const auto& features = frame.features;
-    for (std::size_t i = 0; i < features.size(); ++i) {
-      const float z_m = features.depth_m[i];
-      if (!(z_m > 0.0F) || z_m > kMaxDepth_m) continue;
-      const Eigen::Vector2d u_px = features.undistorted_px[i].cast<double>();
-      own.push_back(
-          z_m * Eigen::Vector3d((u_px.x() - c.cx_px) / c.fx_px, (u_px.y() - c.cy_px) / c.fy_px, 1.0)
-                    .cast<float>());
-    }
+    points.push_back(loop::surface_points(
+        frame.features, drive.camera, loop::SurfacePlacesConfig().max_depth_m));
   }
   return points;
 }

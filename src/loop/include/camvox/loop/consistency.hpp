@@ -37,6 +37,9 @@ struct PoseSigma {
   [[nodiscard]] geometry::Matrix6d covariance() const;
 };
 
+/// Of the least certain axis.
+[[nodiscard]] PoseSigma largest_sigma(const geometry::Matrix6d& covariance);
+
 /// Of a path of this length.
 [[nodiscard]] PoseSigma path_sigma(double length_m, const DriftConfig& config);
 

@@ -5,7 +5,9 @@
 #include <vector>
 
 #include "camvox/config/parameters.hpp"
+#include "camvox/features/feature.hpp"
 #include "camvox/geometry/se3.hpp"
+#include "camvox/optimization/point_observation.hpp"
 
 namespace camvox::loop {
 
@@ -24,6 +26,11 @@ struct SurroundingsConfig {
     field("grain_m", self.grain_m, config::at_least(0.05), config::at_most(2.0));
   }
 };
+
+/// What features with depth up to `max_depth_m` show of the surfaces around, in their camera frame.
+[[nodiscard]] std::vector<Eigen::Vector3f> surface_points(const features::FrameFeatures& features,
+                                                          const optimization::PinholeCamera& camera,
+                                                          double max_depth_m);
 
 /// Points on surfaces that were measured from one pose.
 struct SurfaceView {
