@@ -212,6 +212,7 @@ void TrackingComponent::report(const tracking::FrameResult& result) {
   diagnostics.set("dropped frames", queue_.dropped());
   diagnostics.set("landmarks", static_cast<std::uint64_t>(tracker_.map().landmarks().size()));
   count("banned landmarks", statistics.banned_landmarks);
+  count("refused poses", statistics.refused_poses);
   const auto& health = health_.status();
   diagnostics.report(kLevels.at(static_cast<std::size_t>(health.level)), health.message);
 }

@@ -40,6 +40,7 @@ Tracker::Tracker(const TrackerConfig& config,
       camera_(camera),
       T_body_camera_(T_body_camera),
       map_(camera.pinhole, camera.scale),
+      limit_(config.max_acceleration_mps2),
       T_odom_camera_(T_body_camera),
       frames_since_request_(config.relocalisation_interval) {
   config::require_valid(config, "tracking");
@@ -70,7 +71,7 @@ FrameResult Tracker::track(Frame frame) {
     } else if (is_tracked()) {
       estimate = follow(frame, matcher);
     } else {
-      estimate = find_again(matcher);
+      estimate = find_again(frame, matcher);
     }
   }
   if (estimate) {
@@ -112,7 +113,7 @@ std::optional<PosePrior> Tracker::gyro_prior(const Frame& frame, const SE3& T_ma
 }
 
 // First near where the motion predicts each landmark, then in a wider circle, then by looks alone.
-std::optional<PoseEstimate> Tracker::follow(const Frame& frame, FrameMatcher& matcher) const {
+std::optional<PoseEstimate> Tracker::follow(const Frame& frame, FrameMatcher& matcher) {
   const double dt_s = static_cast<double>(frame.stamp_ns - last_.stamp_ns) * kNsToS;
   const SE3 T_predicted = last_.T_map_camera * motion_.predict(dt_s, frame.R_previous_camera);
   const auto prior = gyro_prior(frame, T_predicted);
@@ -126,12 +127,13 @@ std::optional<PoseEstimate> Tracker::follow(const Frame& frame, FrameMatcher& ma
     const auto start = if_ok(matcher.optimize(T_predicted, prior));
     if (!start) continue;
     auto estimate = refine(matcher, start->T_world_camera, config_.map_radius_px, prior);
-    if (estimate && estimate->inliers >= config_.min_inliers) return estimate;
+    const bool enough = estimate && estimate->inliers >= config_.min_inliers;
+    if (enough && is_possible(frame, *estimate)) return estimate;
   }
-  return find_again(matcher);
+  return find_again(frame, matcher);
 }
 
-std::optional<PoseEstimate> Tracker::find_again(FrameMatcher& matcher) const {
+std::optional<PoseEstimate> Tracker::find_again(const Frame& frame, FrameMatcher& matcher) {
   // At a place just proposed, nothing can be found before its map has come.
   if (map_.empty() || !map_.T_map_keyframe(reference_id_)) return std::nullopt;
   const auto T_map_camera = matcher.match_anywhere(last_.T_map_camera);
@@ -141,7 +143,17 @@ std::optional<PoseEstimate> Tracker::find_again(FrameMatcher& matcher) const {
   auto estimate =
       refine(matcher, start->T_world_camera, kWideSearch * config_.map_radius_px, std::nullopt);
   if (!estimate || estimate->inliers < config_.min_inliers_relocalised) return std::nullopt;
+  if (!is_possible(frame, *estimate)) return std::nullopt;
   return estimate;
+}
+
+bool Tracker::is_possible(const Frame& frame, const PoseEstimate& estimate) {
+  const double dt_s = static_cast<double>(frame.stamp_ns - last_.stamp_ns) * kNsToS;
+  const SE3 T_last_camera = last_.T_map_camera.inverse() * estimate.T_world_camera;
+  const double sigma_m = std::sqrt(estimate.covariance_camera.diagonal().tail<3>().sum());
+  if (limit_.allows(T_last_camera, dt_s, sigma_m)) return true;
+  ++refused_poses_;
+  return false;
 }
 
 std::optional<PoseEstimate> Tracker::refine(FrameMatcher& matcher,
@@ -164,6 +176,7 @@ void Tracker::accept(Frame& frame,
   } else {
     motion_.reset();
   }
+  if (state_ != TrackingState::kRelocalising && dt_s > 0.0) limit_.observe(T_last_camera, dt_s);
   state_ = config_.localisation_only ? TrackingState::kLocalisationOnly : TrackingState::kTracking;
   frames_lost_ = 0;
   requested_frame_id_.reset();
@@ -210,6 +223,7 @@ void Tracker::relocalise(const RelocalisationHint& hint) {
   requested_frame_id_.reset();
   if (is_tracked() || (!map_.empty() && hint.map_epoch < map_.map_epoch())) return;
   state_ = TrackingState::kRelocalising;
+  limit_.forget();
   frames_lost_ = 0;
   reference_id_ = hint.keyframe_id;
   last_.T_map_camera = hint.T_map_camera;
@@ -338,6 +352,7 @@ void Tracker::fill(FrameResult& result) const {
   result.T_odom_camera = T_odom_camera_;
   result.angular_velocity_camera = motion_.twist_camera().head<3>();
   result.velocity_camera = motion_.twist_camera().tail<3>();
+  result.statistics.refused_poses = refused_poses_;
   result.statistics.banned_landmarks = map_.banned_count();
 }
 

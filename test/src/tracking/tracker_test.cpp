@@ -214,6 +214,35 @@ TEST_F(TrackerTest, MovingThingsDoNotDragThePose) {
   EXPECT_GT(result_.statistics.banned_landmarks, 20);
 }
 
+// Something that fills the picture drives along for a while: all of each frame agrees with the
+// landmarks that the one before founded on it. Slow things are given away later.
+TEST_F(TrackerTest, WhatFillsThePictureDoesNotTakeThePoseAlong) {
+  struct Passing {
+    double speed_mps;
+    int frames;
+  };
+  for (const auto& [speed_mps, frames] : {Passing{3.0, 5}, Passing{6.0, 12}, Passing{12.0, 20}}) {
+    world_ = TunnelWorld();
+    frame_id_ = 0;
+    start();
+    for (int i = 0; i < 20; ++i) step(at(0.3 * i));
+    const Eigen::Vector3d step_world(0.1 * speed_mps, 0.0, 0.0);
+    int i = 20;
+    for (; i < 20 + frames; ++i) {
+      world_.move_some(1, step_world);
+      step(at(0.3 * i));
+      EXPECT_FALSE(result_.keyframe) << speed_mps << " m/s, frame " << i;
+    }
+    EXPECT_GT(result_.statistics.refused_poses, 0) << speed_mps;
+    world_.move_some(1, -frames * step_world);
+    for (; i < 40 + frames; ++i) {
+      step(at(0.3 * i));
+      ASSERT_TRUE(result_.has_pose()) << speed_mps << " m/s, frame " << i;
+      ASSERT_LT(error_m(at(0.3 * i)), 0.05) << speed_mps << " m/s, frame " << i;
+    }
+  }
+}
+
 TEST_F(TrackerTest, CorrectionsMoveTheMapNotOdometry) {
   start();
   for (int i = 0; i <= 20; ++i) step(at(0.3 * i));

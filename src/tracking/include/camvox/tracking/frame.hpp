@@ -36,6 +36,7 @@ struct FrameStatistics {
   int inliers_with_depth = 0;
   int banned_landmarks = 0;   ///< Landmarks that disagreed too often, e.g. on moving objects.
   double chi2_per_row = 0.0;  ///< Mean squared residual; about 1 when all is well.
+  int refused_poses = 0;  ///< So far: poses that the camera cannot have come to, see MotionLimit.
 };
 
 /// What tracking says of one frame.

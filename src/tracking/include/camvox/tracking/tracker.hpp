@@ -6,6 +6,7 @@
 #include "camvox/tracking/frame.hpp"
 #include "camvox/tracking/frame_matcher.hpp"
 #include "camvox/tracking/map_replica.hpp"
+#include "camvox/tracking/motion_limit.hpp"
 #include "camvox/tracking/motion_model.hpp"
 #include "camvox/tracking/tracker_config.hpp"
 
@@ -44,8 +45,10 @@ class Tracker {
   using Estimate = std::optional<optimization::PoseEstimate>;
 
   void start_map(Frame& frame, const FrameMatcher& matcher, FrameResult& result);
-  [[nodiscard]] Estimate follow(const Frame& frame, FrameMatcher& matcher) const;
-  [[nodiscard]] Estimate find_again(FrameMatcher& matcher) const;
+  [[nodiscard]] Estimate follow(const Frame& frame, FrameMatcher& matcher);
+  [[nodiscard]] Estimate find_again(const Frame& frame, FrameMatcher& matcher);
+  /// False, and counted, when nothing could have carried the camera there.
+  [[nodiscard]] bool is_possible(const Frame& frame, const optimization::PoseEstimate& estimate);
   [[nodiscard]] Estimate refine(FrameMatcher& matcher,
                                 const geometry::SE3& T_map_camera,
                                 double radius_px,
@@ -80,6 +83,8 @@ class Tracker {
   TrackingState state_ = TrackingState::kWaiting;
   MapReplica map_;
   MotionModel motion_;
+  MotionLimit limit_;
+  int refused_poses_ = 0;
   TrackedFrame last_;
   geometry::SE3 T_odom_camera_;
   KeyframeId reference_id_ = 0;

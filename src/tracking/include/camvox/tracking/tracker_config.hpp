@@ -23,7 +23,9 @@ struct TrackerConfig {
   double motion_radius_gyro_px = 6.0;  ///< The same when the gyro predicts the rotation.
   double map_radius_px = 7.5;          ///< Search for landmarks of the local map.
   double gyro_sigma_deg = 0.2;         ///< Of the rotation between two frames; 0: no prior.
-  bool localisation_only = false;      ///< Make no keyframes: the map stays as it is.
+  /// Of what carries the camera. A pose that would take more is refused; 0: none is.
+  double max_acceleration_mps2 = 6.0;
+  bool localisation_only = false;  ///< Make no keyframes: the map stays as it is.
   /// Wait for a map and a place in it instead of starting a map; localisation_only implies it.
   bool relocalise_at_start = false;
   int relocalisation_interval = 5;  ///< Frames between two requests while lost.
@@ -43,6 +45,7 @@ struct TrackerConfig {
     field("motion_radius_gyro_px", self.motion_radius_gyro_px, config::greater_than(0.0));
     field("map_radius_px", self.map_radius_px, config::greater_than(0.0));
     field("gyro_sigma_deg", self.gyro_sigma_deg, config::at_least(0.0));
+    field("max_acceleration_mps2", self.max_acceleration_mps2, config::at_least(0.0));
     field("localisation_only", self.localisation_only);
     field("relocalise_at_start", self.relocalise_at_start);
     field("relocalisation_interval", self.relocalisation_interval, config::at_least(1));
