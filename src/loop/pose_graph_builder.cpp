@@ -99,18 +99,16 @@ class Builder {
 /// hardly any weight. The other start is where all loops hold; that with the lower cost counts, so
 /// loops must be worth what they bend.
 optimization::PoseGraphSolution solve_from_best_start(const CorrectionTask& task) {
-  constexpr double kAny_sigma = 1e6;
   auto all_hold = task.config;
-  all_hold.kernel_width_sigma = all_hold.outlier_sigma = kAny_sigma;
-  auto keep_all = task.config;
-  keep_all.outlier_sigma = kAny_sigma;
+  all_hold.kernel_width_sigma = 1e6;
+  all_hold.relative_tolerance = 1e-2;  // only a start
   auto graph = task.graph;
-  graph.T_map_node = optimization::solve(graph, all_hold).T_map_node;
-  const auto bent = optimization::solve(graph, keep_all);
-  const auto as_is = optimization::solve(task.graph, keep_all);
+  graph.T_map_node = optimization::solve_with_all_edges(graph, all_hold).T_map_node;
+  const auto bent = optimization::solve_with_all_edges(graph, task.config);
+  const auto as_is = optimization::solve_with_all_edges(task.graph, task.config);
   const bool use_bent = bent.summary.usable && bent.summary.cost_after < as_is.summary.cost_after;
-  graph.T_map_node = use_bent ? bent.T_map_node : as_is.T_map_node;
-  auto solution = optimization::solve(graph, task.config);
+  auto solution =
+      optimization::leave_out_outliers(task.graph, use_bent ? bent : as_is, task.config);
   solution.summary.cost_before = as_is.summary.cost_before;
   return solution;
 }

@@ -79,9 +79,14 @@ class RelativePoseCost final : public ceres::SizedCostFunction<6, 7, 7> {
 
   bool Evaluate(double const* const* poses, double* residuals, double** jacobians) const override {
     using RowMajor = Eigen::Matrix<double, 6, 7, Eigen::RowMajor>;
-    const auto result = evaluate_relative_pose(to_se3(poses[0]), to_se3(poses[1]), T_from_to_);
-    Eigen::Map<Vector6d>(residuals, 6) = weight_ * result.r;
-    if (jacobians == nullptr) return true;
+    const SE3 T_map_from = to_se3(poses[0]), T_map_to = to_se3(poses[1]);
+    Eigen::Map<Vector6d> weighted(residuals);
+    if (jacobians == nullptr) {
+      weighted = weight_ * relative_pose_residual(T_map_from, T_map_to, T_from_to_);
+      return true;
+    }
+    const auto result = evaluate_relative_pose(T_map_from, T_map_to, T_from_to_);
+    weighted = weight_ * result.r;
     if (jacobians[0] != nullptr) {
       Eigen::Map<RowMajor> J(jacobians[0]);
       J.leftCols<6>() = weight_ * result.J_from;
@@ -127,10 +132,12 @@ ceres::Solver::Options solver_options(const PoseGraphConfig& config) {
 }
 
 /// One pass over the edges that are still in.
-ceres::Solver::Summary solve_once(const PoseGraph& graph,
-                                  const PoseGraphConfig& config,
-                                  const std::vector<bool>& left_out,
-                                  std::vector<Block>& blocks) {
+PoseGraphSolution solve_once(const PoseGraph& graph,
+                             const PoseGraphConfig& config,
+                             const std::vector<SE3>& start,
+                             const std::vector<bool>& left_out) {
+  std::vector<Block> blocks;
+  for (const auto& T : start) blocks.push_back(to_block(T));
   Se3Manifold manifold;
   ceres::CauchyLoss kernel(config.kernel_width_sigma);
   ceres::Problem::Options problem_options;
@@ -149,16 +156,29 @@ ceres::Solver::Summary solve_once(const PoseGraph& graph,
                              blocks[edge.from].data(),
                              blocks[edge.to].data());
   }
-  ceres::Solver::Summary summary;
-  ceres::Solve(solver_options(config), &problem, &summary);
-  return summary;
+  ceres::Solver::Summary report;
+  ceres::Solve(solver_options(config), &problem, &report);
+
+  PoseGraphSolution solution;
+  solution.summary.nodes = graph.T_map_node.size();
+  solution.summary.edges = graph.edges.size();
+  solution.summary.iterations = static_cast<int>(report.iterations.size());
+  solution.summary.cost_before = report.initial_cost;
+  solution.summary.cost_after = report.final_cost;
+  solution.summary.usable = report.IsSolutionUsable();
+  if (!solution.summary.usable) {
+    solution.T_map_node = graph.T_map_node;
+    return solution;
+  }
+  for (const auto& block : blocks) solution.T_map_node.push_back(to_se3(block.data()));
+  return solution;
 }
 
 /// Squared distance of an edge from the poses, in sigma.
-double squared_distance(const PoseGraphEdge& edge, const std::vector<Block>& blocks) {
-  const auto result = evaluate_relative_pose(
-      to_se3(blocks[edge.from].data()), to_se3(blocks[edge.to].data()), edge.T_from_to);
-  return result.r.dot(edge.covariance_to.llt().solve(result.r));
+double squared_distance(const PoseGraphEdge& edge, const std::vector<SE3>& T_map_node) {
+  const Vector6d r =
+      relative_pose_residual(T_map_node[edge.from], T_map_node[edge.to], edge.T_from_to);
+  return r.dot(edge.covariance_to.llt().solve(r));
 }
 
 }  // namespace
@@ -179,51 +199,49 @@ std::string PoseGraphSummary::to_string() const {
   return text.data();
 }
 
+Vector6d relative_pose_residual(const SE3& T_map_from, const SE3& T_map_to, const SE3& T_from_to) {
+  return (T_from_to.inverse() * (T_map_from.inverse() * T_map_to)).log();
+}
+
 RelativePoseResidual evaluate_relative_pose(const SE3& T_map_from,
                                             const SE3& T_map_to,
                                             const SE3& T_from_to) {
-  const SE3 T_to_from = T_map_to.inverse() * T_map_from;
   RelativePoseResidual result;
-  result.r = (T_from_to.inverse() * T_to_from.inverse()).log();
+  result.r = relative_pose_residual(T_map_from, T_map_to, T_from_to);
   result.J_to = SE3::right_jacobian_inverse(result.r);
-  result.J_from = -result.J_to * T_to_from.adjoint();
+  result.J_from = -result.J_to * (T_map_to.inverse() * T_map_from).adjoint();
+  return result;
+}
+
+PoseGraphSolution solve_with_all_edges(const PoseGraph& graph, const PoseGraphConfig& config) {
+  check(graph);
+  return solve_once(graph, config, graph.T_map_node, std::vector<bool>(graph.edges.size(), false));
+}
+
+PoseGraphSolution leave_out_outliers(const PoseGraph& graph,
+                                     const PoseGraphSolution& solution,
+                                     const PoseGraphConfig& config) {
+  if (!solution.summary.usable) return solution;
+  const double limit = config.outlier_sigma * config.outlier_sigma;
+  std::vector<bool> left_out(graph.edges.size(), false);
+  std::vector<std::size_t> outliers;
+  for (std::size_t i = 0; i < graph.edges.size(); ++i) {
+    const auto& edge = graph.edges[i];
+    if (!edge.robust || !(squared_distance(edge, solution.T_map_node) > limit)) continue;
+    left_out[i] = true;
+    outliers.push_back(i);
+  }
+  if (outliers.empty()) return solution;
+  auto result = solve_once(graph, config, solution.T_map_node, left_out);
+  result.summary.iterations += solution.summary.iterations;
+  result.summary.cost_before = solution.summary.cost_before;
+  result.summary.outliers = outliers.size();
+  result.outliers = std::move(outliers);
   return result;
 }
 
 PoseGraphSolution solve(const PoseGraph& graph, const PoseGraphConfig& config) {
-  check(graph);
-  PoseGraphSolution solution;
-  solution.T_map_node = graph.T_map_node;
-  auto& summary = solution.summary;
-  summary.nodes = graph.T_map_node.size();
-  summary.edges = graph.edges.size();
-
-  std::vector<Block> blocks;
-  for (const auto& T : graph.T_map_node) blocks.push_back(to_block(T));
-  std::vector<bool> left_out(graph.edges.size(), false);
-  const auto first = solve_once(graph, config, left_out, blocks);
-  summary.iterations = static_cast<int>(first.iterations.size());
-  summary.cost_before = first.initial_cost;
-  summary.cost_after = first.final_cost;
-  summary.usable = first.IsSolutionUsable();
-  if (!summary.usable) return solution;
-
-  const double limit = config.outlier_sigma * config.outlier_sigma;
-  for (std::size_t i = 0; i < graph.edges.size(); ++i) {
-    if (!graph.edges[i].robust || !(squared_distance(graph.edges[i], blocks) > limit)) continue;
-    left_out[i] = true;
-    solution.outliers.push_back(i);
-  }
-  if (!solution.outliers.empty()) {
-    const auto second = solve_once(graph, config, left_out, blocks);
-    summary.iterations += static_cast<int>(second.iterations.size());
-    summary.cost_after = second.final_cost;
-    summary.usable = second.IsSolutionUsable();
-    if (!summary.usable) return solution;
-  }
-  summary.outliers = solution.outliers.size();
-  for (std::size_t i = 0; i < blocks.size(); ++i) solution.T_map_node[i] = to_se3(blocks[i].data());
-  return solution;
+  return leave_out_outliers(graph, solve_with_all_edges(graph, config), config);
 }
 
 }  // namespace camvox::optimization

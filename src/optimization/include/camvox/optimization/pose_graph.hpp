@@ -68,6 +68,9 @@ struct RelativePoseResidual {
   geometry::Matrix6d J_from;  ///< d r / d xi for T_map_from * exp(xi).
   geometry::Matrix6d J_to;    ///< d r / d xi for T_map_to * exp(xi).
 };
+[[nodiscard]] geometry::Vector6d relative_pose_residual(const geometry::SE3& T_map_from,
+                                                        const geometry::SE3& T_map_to,
+                                                        const geometry::SE3& T_from_to);
 [[nodiscard]] RelativePoseResidual evaluate_relative_pose(const geometry::SE3& T_map_from,
                                                           const geometry::SE3& T_map_to,
                                                           const geometry::SE3& T_from_to);
@@ -79,5 +82,13 @@ struct RelativePoseResidual {
 /// Throws std::logic_error for an index out of range, no fixed node, or a covariance that is not
 /// positive definite.
 [[nodiscard]] PoseGraphSolution solve(const PoseGraph& graph, const PoseGraphConfig& config = {});
+
+/// The two halves of solve(), for who compares solutions in between: all edges stay in, with the
+/// kernel on the robust ones; then those that disagree are left out.
+[[nodiscard]] PoseGraphSolution solve_with_all_edges(const PoseGraph& graph,
+                                                     const PoseGraphConfig& config = {});
+[[nodiscard]] PoseGraphSolution leave_out_outliers(const PoseGraph& graph,
+                                                   const PoseGraphSolution& solution,
+                                                   const PoseGraphConfig& config = {});
 
 }  // namespace camvox::optimization
