@@ -18,6 +18,7 @@ namespace fs = std::filesystem;
 
 constexpr auto kReplay = "camvox::ReplayComponent";
 constexpr auto kTracking = "camvox::TrackingComponent";
+constexpr auto kOverlay = "depth_overlay";
 /// What a depth image is made by; tracking tells deskew how fast the robot goes.
 constexpr std::array kNeeded = {"camvox::SyncComponent",
                                 "camvox::DeskewComponent",
@@ -62,7 +63,7 @@ SystemConfig reduced(SystemConfig config, const InspectOptions& options, const f
   if (!lidar) {
     std::erase_if(config.components, [](const auto& c) { return c.plugin == kTracking; });
   }
-  std::vector<std::string> stages;
+  std::vector<std::string> stages = {kOverlay};  // it is to see every frame
   for (auto& component : config.components) {
     if (component.plugin != kReplay) stages.push_back(component.name);
     if (component.plugin == kTracking) component.parameters["wait_for_map"] = given(false);
@@ -75,7 +76,7 @@ SystemConfig reduced(SystemConfig config, const InspectOptions& options, const f
   }
   ComponentConfig overlay;
   overlay.plugin = "camvox::DepthOverlayComponent";
-  overlay.name = "depth_overlay";
+  overlay.name = kOverlay;
   overlay.location = overlay.plugin_location = {"camvox inspect", 0};
   overlay.parameters["file"] = given(picture.string());
   overlay.parameters["exit_when_found"] = given(true);

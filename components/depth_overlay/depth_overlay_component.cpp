@@ -20,11 +20,12 @@ constexpr std::int64_t kNear_ns = kSecond_ns / 2;
 }  // namespace
 
 DepthOverlayComponent::DepthOverlayComponent(Context& context)
-    : context_(context), config_(context.parameters<DepthOverlayConfig>()) {
+    : context_(context), config_(context.parameters<DepthOverlayConfig>()), progress_(context) {
   const SubscribeOptions frames{.qos = qos::kFrames, .max_held = kFramesKept + 2};
   context.subscribe<FrameImage>(
       {"frame_image", topics::kFrameImage},
       [this](const auto& image) {
+        const auto work = progress_.measure();
         frames_[image->header().frame_id()].image = image;
         take(image->header().frame_id());
       },
@@ -32,6 +33,7 @@ DepthOverlayComponent::DepthOverlayComponent(Context& context)
   context.subscribe<DepthImage>(
       {"depth_image", topics::kDepthImage},
       [this](const auto& depth) {
+        const auto work = progress_.measure();
         frames_[depth->header().frame_id()].depth = depth;
         take(depth->header().frame_id());
       },
@@ -48,6 +50,7 @@ void DepthOverlayComponent::take(std::uint64_t frame_id) {
     const bool usable = asked_for || (*parts.depth)->depth_m_count() > 0;
     if (usable && is_better(image)) chosen_.emplace(Frame{*parts.image, *parts.depth});
     if (config_.exit_when_found && is_found(image)) context_.request_exit();
+    progress_.done(image.header());
     frames_.erase(frame_id);
   }
   while (frames_.size() > kFramesKept) frames_.erase(frames_.begin());

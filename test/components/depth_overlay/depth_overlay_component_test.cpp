@@ -95,6 +95,18 @@ TEST_F(DepthOverlayTest, DrawsTheFrameNearestToAStamp) {
   EXPECT_THAT(end(component), HasSubstr("frame 2 "));
 }
 
+// Lockstep replay waits for it: what it is behind with, it would lose.
+TEST_F(DepthOverlayTest, TellsWhichFramesItHasSeen) {
+  DepthOverlayComponent component(fake_);
+  send_frame(1);
+  send_frame(2, false);
+  const auto done = fake_.published<camvox_interfaces::msg::Progress>("progress");
+  ASSERT_EQ(done.size(), 2U);
+  EXPECT_EQ(done[0]->header().frame_id(), 1U);
+  EXPECT_EQ(done[1]->header().frame_id(), 2U);
+  component.stop();
+}
+
 TEST_F(DepthOverlayTest, SaysThatThereIsNoSuchFrame) {
   fake_.set_parameter("frame_id", std::int64_t{9});
   DepthOverlayComponent component(fake_);

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "camvox/component/component.hpp"
+#include "camvox/component/progress.hpp"
 #include "camvox/interfaces/camvox_interfaces.hpp"
 
 namespace camvox {
@@ -32,7 +33,8 @@ struct DepthOverlayConfig {
 
 /// Keeps one frame's image and depth, wherever they come from (lidar, RGB-D camera), and writes
 /// them at the end as a picture (see depth::draw_overlay). Nothing is copied or drawn before. The
-/// last frame is the last that has depth.
+/// last frame is the last that has depth. Lockstep waits for it, or under load it would miss
+/// frames.
 class DepthOverlayComponent final : public Component {
  public:
   explicit DepthOverlayComponent(Context& context);
@@ -58,6 +60,7 @@ class DepthOverlayComponent final : public Component {
 
   Context& context_;
   DepthOverlayConfig config_;
+  ProgressReporter progress_;
   std::map<std::uint64_t, Parts> frames_;  ///< Of which a part is still missing.
   std::optional<Frame> chosen_;
   std::uint64_t seen_ = 0;
