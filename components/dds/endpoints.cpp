@@ -135,8 +135,10 @@ void WriterHandle::on_publication_matched(fdds::DataWriter*,
     } else {
       matched_.erase(status.last_subscription_handle);
     }
+    // Not status.current_count: one reader's end and another's begin are told by two threads, in
+    // any order.
+    readers_ = matched_.size();
   }
-  readers_ = static_cast<std::size_t>(std::max(0, status.current_count));
   if (on_match_change_) on_match_change_();
 }
 

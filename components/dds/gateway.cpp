@@ -1,5 +1,7 @@
 #include "gateway.hpp"
 
+#include <atomic>
+
 #include "plain_publisher.hpp"
 #include "plain_subscription.hpp"
 #include "topic_types.hpp"
@@ -66,7 +68,9 @@ class Gateway::Export : public std::enable_shared_from_this<Export> {
 
   /// Reads the in-place topic only while somebody outside wants it.
   void follow_readers() {
-    const bool wanted = writer_->reader_count() > 0;
+    const auto readers = writer_->reader_count();
+    log_->debug("{}: {} readers in other processes", topic_, readers);
+    const bool wanted = readers > 0;
     if (wanted == (flow_ != nullptr)) return;
     if (!wanted) {
       executor_->remove(std::exchange(flow_, nullptr), kDetachTimeout);
@@ -107,6 +111,8 @@ class Gateway::Import {
  public:
   Import(Gateway& gateway, const std::string& topic, const Entry& entry)
       : executor_(gateway.executor_),
+        log_(gateway.log_),
+        topic_(topic),
         tenant_(make_tenant("import " + topic, gateway.log_)),
         flow_(std::make_shared<Flow>(gateway, topic, entry)) {
     executor_->add_source(
@@ -114,7 +120,13 @@ class Gateway::Import {
   }
   Import(const Import&) = delete;
   Import& operator=(const Import&) = delete;
-  ~Import() { executor_->remove(tenant_, kDetachTimeout); }
+  ~Import() {
+    executor_->remove(tenant_, kDetachTimeout);
+    log_->debug("{}: {} messages from {} writers in other processes at the end",
+                topic_,
+                flow_->taken_count.load(),
+                flow_->reader.writer_count());
+  }
 
  private:
   struct Flow {
@@ -140,6 +152,7 @@ class Gateway::Import {
       const auto code = reader->take_next_sample(&data, &info);
       const bool taken = code == ReturnCode::RETCODE_OK;
       const bool valid = taken && info.valid_data;
+      if (valid) ++taken_count;
       if (valid) stats->lost += tracker.track(info).lost_before;
       if (valid && !data.well_formed) ++stats->rejected;
       if (valid && data.well_formed) {
@@ -152,12 +165,15 @@ class Gateway::Import {
 
     const MessageType& type;
     std::shared_ptr<AtomicStats> stats;
+    std::atomic<std::uint64_t> taken_count = 0;
     SequenceTracker tracker;
     PlainPublisher publisher;
     ReaderHandle reader;
   };
 
   std::shared_ptr<Executor> executor_;
+  std::shared_ptr<Logger> log_;
+  std::string topic_;
   std::shared_ptr<Tenant> tenant_;
   std::shared_ptr<Flow> flow_;
 };

@@ -36,10 +36,18 @@ std::string to_text(const Guid& guid) {
 /// Remembers every endpoint and participant that discovery reports.
 class DiscoveryListener final : public fdds::DomainParticipantListener {
  public:
+  explicit DiscoveryListener(Logger& log) : log_(log) {}
   void on_participant_discovery(fdds::DomainParticipant*,
                                 rtps::ParticipantDiscoveryInfo&& info) override {
+    using Info = rtps::ParticipantDiscoveryInfo;
+    const auto prefix = to_text(info.info.m_guid.guidPrefix);
+    const auto name = info.info.m_participantName.to_string();
+    const bool gone =
+        info.status == Info::REMOVED_PARTICIPANT || info.status == Info::DROPPED_PARTICIPANT;
     const std::lock_guard lock(mutex_);
-    names_[to_text(info.info.m_guid.guidPrefix)] = info.info.m_participantName.to_string();
+    const bool is_news =
+        gone ? names_.erase(prefix) > 0 : names_.insert_or_assign(prefix, name).second;
+    if (is_news) log_.debug("process {} ({}) {}", name, prefix, gone ? "has gone" : "is there");
   }
   void on_subscriber_discovery(fdds::DomainParticipant*,
                                rtps::ReaderDiscoveryInfo&& info) override {
@@ -88,6 +96,7 @@ class DiscoveryListener final : public fdds::DomainParticipantListener {
     endpoints_[guid] = std::move(found);
   }
 
+  Logger& log_;
   mutable std::mutex mutex_;
   std::map<std::string, Found> endpoints_;
   std::map<std::string, std::string> names_;
@@ -109,6 +118,8 @@ class LogConsumer final : public fdds::LogConsumer {
 }  // namespace
 
 struct Participant::Implementation {
+  explicit Implementation(Logger& log) : listener(log) {}
+
   struct TopicUse {
     fdds::Topic* topic = nullptr;
     std::string type_name;
@@ -139,9 +150,10 @@ std::shared_ptr<Participant> Participant::create(const ParticipantOptions& optio
 }
 
 Participant::Participant(ParticipantOptions options, Logger& log)
-    : options_(std::move(options)), implementation_(std::make_unique<Implementation>()) {
+    : options_(std::move(options)), implementation_(std::make_unique<Implementation>(log)) {
   fdds::Log::ClearConsumers();
   fdds::Log::RegisterConsumer(std::make_unique<LogConsumer>(log));
+  if (log.enabled(LogLevel::kDebug)) fdds::Log::SetVerbosity(fdds::Log::Kind::Warning);
   auto& self = *implementation_;
   self.participant = fdds::DomainParticipantFactory::get_instance()->create_participant(
       static_cast<std::uint32_t>(options_.domain_id),
