@@ -144,7 +144,7 @@ class Runs:
 
     # Faults, for `split(meanwhile=...)`: each returns the back end that runs afterwards.
 
-    def kill_back_end(self, name, after_s, hosts=None):
+    def kill_back_end(self, name, after_s, hosts=None, more=()):
         """kill -9 after some time, and a new back end one second later."""
         hosts = hosts or OneHost()
 
@@ -153,7 +153,8 @@ class Runs:
             back.kill()
             back.wait()
             time.sleep(1.0)
-            return self.start("back_end.yaml", self.work / name / "back", hosts.options, hosts.back)
+            return self.start("back_end.yaml", self.work / name / "back",
+                              hosts.options + list(more), hosts.back)
 
         return fault
 
