@@ -1,5 +1,7 @@
 #include "camvox/dds/shared_memory.hpp"
 
+#include <fcntl.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <sys/statvfs.h>
 #include <unistd.h>
@@ -8,6 +10,7 @@
 #include <chrono>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <set>
 
 namespace camvox::dds {
@@ -22,9 +25,30 @@ bool is_fast_dds_file(const std::string& name) {
          name.starts_with("sem.fastrtps_");
 }
 
-/// Files below the directory that living processes have mapped. /proc is not readable for
-/// processes of other users; their files are not ours to delete either.
-std::set<std::string> mapped_files(const std::string& directory) {
+/// A segment or port and what belongs to it have a name in common: fastrtps_X, fastrtps_X_el and
+/// fastrtps_X_sl, sem.fastrtps_X_mutex.
+std::string common_name(std::string name) {
+  const auto drop_end = [&name](std::string_view end) {
+    if (name.ends_with(end)) name.resize(name.size() - end.size());
+  };
+  if (name.starts_with("sem.")) name.erase(0, 4);
+  for (const auto end : {"_mutex", "_el", "_sl"}) drop_end(end);
+  return name;
+}
+
+bool is_lock(const std::string& name) { return name.ends_with("_el") || name.ends_with("_sl"); }
+
+/// Whether a living process holds the lock, wherever it runs: a kernel lock knows no namespaces.
+bool is_held(const fs::path& lock) {
+  const int file = open(lock.c_str(), O_RDONLY | O_CLOEXEC);
+  if (file < 0) return true;
+  const bool taken = flock(file, LOCK_EX | LOCK_NB) == 0;
+  close(file);
+  return !taken;
+}
+
+/// Files below the directory that processes which we may look into have mapped or open.
+std::set<std::string> visibly_used(const std::string& directory) {
   std::set<std::string> names;
   std::error_code ignored;
   for (const auto& process : fs::directory_iterator("/proc", ignored)) {
@@ -41,6 +65,19 @@ std::set<std::string> mapped_files(const std::string& directory) {
   return names;
 }
 
+/// Whether we can look into all processes of our user that may use /dev/shm. Not so in a user or
+/// process namespace of our own (a sandbox, a container) that shares the machine's memory.
+bool all_users_are_visible() {
+  // The machine's own namespaces have fixed numbers: include/linux/proc_ns.h of the kernel.
+  const auto is_the_machines = [](const char* file, ino_t number) {
+    struct stat status {};
+    return stat(file, &status) == 0 && status.st_ino == number;
+  };
+  if (!is_the_machines("/proc/self/ns/ipc", 0xEFFFFFFF)) return true;  // shared memory of our own
+  return is_the_machines("/proc/self/ns/user", 0xEFFFFFFD) &&
+         is_the_machines("/proc/self/ns/pid", 0xEFFFFFFC);
+}
+
 bool is_old_and_ours(const fs::path& path) {
   struct stat status {};
   if (lstat(path.c_str(), &status) != 0 || status.st_uid != geteuid()) return false;
@@ -48,6 +85,20 @@ bool is_old_and_ours(const fs::path& path) {
                        std::chrono::system_clock::now().time_since_epoch())
                        .count();
   return now - status.st_ctime >= kYoungestStale_s;
+}
+
+/// Whether files with a common name belong to nobody any more.
+bool is_stale(const fs::path& folder,
+              const std::vector<std::string>& names,
+              const std::set<std::string>& used) {
+  bool had_lock = false;
+  for (const auto& name : names) {
+    if (used.contains(name) || !is_old_and_ours(folder / name)) return false;
+    if (!is_lock(name)) continue;
+    if (is_held(folder / name)) return false;
+    had_lock = true;
+  }
+  return had_lock || all_users_are_visible();
 }
 
 }  // namespace
@@ -59,18 +110,19 @@ std::uint64_t free_shared_memory_bytes(const std::string& directory) {
 }
 
 std::vector<std::string> remove_stale_shared_memory(const std::string& directory) {
-  std::vector<std::string> candidates;
+  std::map<std::string, std::vector<std::string>> groups;
   std::error_code ignored;
   for (const auto& entry : fs::directory_iterator(directory, ignored)) {
     const std::string name = entry.path().filename();
-    if (is_fast_dds_file(name) && is_old_and_ours(entry.path())) candidates.push_back(name);
+    if (is_fast_dds_file(name)) groups[common_name(name)].push_back(name);
   }
-  if (candidates.empty()) return {};
-  const auto used = mapped_files(directory);  // read after listing: a new user is never missed
+  if (groups.empty()) return {};
+  const auto used = visibly_used(directory);  // read after listing: a new user is never missed
   std::vector<std::string> removed;
-  for (const auto& name : candidates) {
-    if (!used.contains(name) && fs::remove(fs::path(directory) / name, ignored)) {
-      removed.push_back(name);
+  for (const auto& [common, names] : groups) {
+    if (!is_stale(directory, names, used)) continue;
+    for (const auto& name : names) {
+      if (fs::remove(fs::path(directory) / name, ignored)) removed.push_back(name);
     }
   }
   std::sort(removed.begin(), removed.end());

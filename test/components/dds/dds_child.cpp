@@ -7,6 +7,7 @@
 #include <deque>
 #include <iostream>
 
+#include "camvox/dds/shared_memory.hpp"
 #include "camvox/interfaces/camvox_interfaces.hpp"
 #include "camvox/test/deadline.hpp"
 #include "camvox/test/test_container.hpp"
@@ -177,6 +178,12 @@ void write_malformed(test::TestContainer& container) {
   wait_for_quit();
 }
 
+/// Removes stale shared memory, as a container does at its start.
+void clean(test::TestContainer&) {
+  for (const auto& name : dds::remove_stale_shared_memory()) say("removed " + name);
+  say("cleaned");
+}
+
 /// Fills whole 8 MiB images in shared memory, more of them than can be in use at a time.
 void write_images(test::TestContainer& container) {
   auto publisher = container.component().advertise<FrameImage>(kImagePort, {.qos = qos::kFrames});
@@ -201,7 +208,8 @@ int run(const std::string& domain, const std::string& transport, const std::stri
       {"write_latched", write_latched},
       {"read_latched", read_latched},
       {"write_malformed", write_malformed},
-      {"write_images", write_images}};
+      {"write_images", write_images},
+      {"clean", clean}};
   const bool shared = transport == "shared";
   test::TestContainer container(options_for(std::stoi(domain), transport),
                                 shared ? shared_topics() : dds::TopicSettingsMap{});

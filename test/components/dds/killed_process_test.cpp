@@ -2,7 +2,7 @@
 
 #include <atomic>
 #include <filesystem>
-#include <fstream>
+#include <thread>
 
 #include "camvox/dds/shared_memory.hpp"
 #include "camvox/interfaces/camvox_interfaces.hpp"
@@ -17,6 +17,7 @@ using camvox_interfaces::msg::Cloud;
 using test::wait_until;
 using ::testing::Contains;
 using ::testing::IsEmpty;
+using ::testing::IsSupersetOf;
 using ::testing::Not;
 
 constexpr Port kPort{"cloud", topics::kCloud};
@@ -116,31 +117,57 @@ TEST(KilledSharedMemory, NextProcessStartsAndLeftoversAreRemoved) {
   }));
 }
 
+constexpr std::chrono::milliseconds kStaleAge{3100};  // what is younger is left alone anyway
+
+/// Files of Fast DDS that were not there before.
+std::vector<std::string> new_files(const std::vector<std::string>& before) {
+  auto names = shared_memory_files();
+  std::erase_if(names, [&before](const std::string& name) {
+    return !name.starts_with("fast") ||
+           std::find(before.begin(), before.end(), name) != before.end();
+  });
+  return names;
+}
+
 TEST(StaleSharedMemory, OfLivingProcessesIsLeftAlone) {
+  const auto before = shared_memory_files();
   test::TestContainer container(test::test_options(), shared_topics());
   auto child = test::start_child("shared", "write");
   ASSERT_TRUE(child.wrote("ready")) << child.output();
-  const auto of_the_living = [] {
-    std::vector<std::string> names;
-    for (auto& name : shared_memory_files()) {
-      if (name.starts_with("fast")) names.push_back(name);
-    }
-    return names;
-  };
-  const auto before = of_the_living();
-  ASSERT_THAT(before, Not(IsEmpty()));
-  // Old enough to be taken for stale.
-  for (const auto& name : before) {
-    const auto path = std::filesystem::path("/dev/shm") / name;
-    std::error_code ignored;
-    std::filesystem::last_write_time(
-        path, std::filesystem::file_time_type::clock::now() - std::chrono::hours(1), ignored);
-  }
+  const auto living = new_files(before);
+  ASSERT_THAT(living, Not(IsEmpty()));
+  std::this_thread::sleep_for(kStaleAge);
   (void)dds::remove_stale_shared_memory();
+  EXPECT_THAT(new_files(before), IsSupersetOf(living));
   std::atomic<std::uint64_t> received = 0;
   container.component().subscribe<Cloud>(kPort, [&](const auto&) { ++received; });
   container.activate();
   EXPECT_TRUE(wait_until([&] { return received >= 5; })) << "the child's memory was taken away";
+}
+
+// In a user namespace of its own, or in another container, a process shares /dev/shm with processes
+// that it may not look into.
+TEST(StaleSharedMemory, OfProcessesThatCannotBeLookedIntoIsLeftAlone) {
+  const auto before = shared_memory_files();
+  test::TestContainer container(test::test_options(), shared_topics());
+  auto child = test::start_child("shared", "write");
+  ASSERT_TRUE(child.wrote("ready")) << child.output();
+  const auto living = new_files(before);
+  ASSERT_THAT(living, Contains(::testing::StartsWith("fast_datasharing")));
+  std::this_thread::sleep_for(kStaleAge);
+  test::ChildProcess stranger({"unshare",
+                               "--user",
+                               "--map-root-user",
+                               DDS_CHILD,
+                               std::to_string(test::own_domain()),
+                               "any",
+                               "clean"});
+  const int code = stranger.wait();
+  if (stranger.wrote("unshare:", std::chrono::milliseconds(0))) {
+    GTEST_SKIP() << "no user namespaces here: " << stranger.output();
+  }
+  ASSERT_EQ(code, 0) << stranger.output();
+  EXPECT_THAT(new_files(before), IsSupersetOf(living)) << stranger.output();
 }
 
 }  // namespace
