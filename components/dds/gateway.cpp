@@ -1,7 +1,5 @@
 #include "gateway.hpp"
 
-#include <atomic>
-
 #include "plain_publisher.hpp"
 #include "plain_subscription.hpp"
 #include "topic_types.hpp"
@@ -124,7 +122,7 @@ class Gateway::Import {
     executor_->remove(tenant_, kDetachTimeout);
     log_->debug("{}: {} messages from {} writers in other processes at the end",
                 topic_,
-                flow_->taken_count.load(),
+                flow_->stats->received.load(),
                 flow_->reader.writer_count());
   }
 
@@ -152,7 +150,7 @@ class Gateway::Import {
       const auto code = reader->take_next_sample(&data, &info);
       const bool taken = code == ReturnCode::RETCODE_OK;
       const bool valid = taken && info.valid_data;
-      if (valid) ++taken_count;
+      if (valid) ++stats->received;
       if (valid) stats->lost += tracker.track(info).lost_before;
       if (valid && !data.well_formed) ++stats->rejected;
       if (valid && data.well_formed) {
@@ -165,7 +163,6 @@ class Gateway::Import {
 
     const MessageType& type;
     std::shared_ptr<AtomicStats> stats;
-    std::atomic<std::uint64_t> taken_count = 0;
     SequenceTracker tracker;
     PlainPublisher publisher;
     ReaderHandle reader;

@@ -153,7 +153,6 @@ Participant::Participant(ParticipantOptions options, Logger& log)
     : options_(std::move(options)), implementation_(std::make_unique<Implementation>(log)) {
   fdds::Log::ClearConsumers();
   fdds::Log::RegisterConsumer(std::make_unique<LogConsumer>(log));
-  if (log.enabled(LogLevel::kDebug)) fdds::Log::SetVerbosity(fdds::Log::Kind::Warning);
   auto& self = *implementation_;
   self.participant = fdds::DomainParticipantFactory::get_instance()->create_participant(
       static_cast<std::uint32_t>(options_.domain_id),

@@ -87,13 +87,11 @@ bool is_old_and_ours(const fs::path& path) {
   return now - status.st_ctime >= kYoungestStale_s;
 }
 
-/// Whether files with a common name belong to nobody any more.
-bool is_stale(const fs::path& folder,
-              const std::vector<std::string>& names,
-              const std::set<std::string>& used) {
+/// Whether files with a common name may belong to nobody any more, as far as they tell themselves.
+bool may_be_stale(const fs::path& folder, const std::vector<std::string>& names) {
   bool had_lock = false;
   for (const auto& name : names) {
-    if (used.contains(name) || !is_old_and_ours(folder / name)) return false;
+    if (!is_old_and_ours(folder / name)) return false;
     if (!is_lock(name)) continue;
     if (is_held(folder / name)) return false;
     had_lock = true;
@@ -116,11 +114,13 @@ std::vector<std::string> remove_stale_shared_memory(const std::string& directory
     const std::string name = entry.path().filename();
     if (is_fast_dds_file(name)) groups[common_name(name)].push_back(name);
   }
+  std::erase_if(groups, [&](const auto& group) { return !may_be_stale(directory, group.second); });
   if (groups.empty()) return {};
   const auto used = visibly_used(directory);  // read after listing: a new user is never missed
+  const auto is_used = [&used](const std::string& name) { return used.contains(name); };
   std::vector<std::string> removed;
   for (const auto& [common, names] : groups) {
-    if (!is_stale(directory, names, used)) continue;
+    if (std::any_of(names.begin(), names.end(), is_used)) continue;
     for (const auto& name : names) {
       if (fs::remove(fs::path(directory) / name, ignored)) removed.push_back(name);
     }

@@ -357,9 +357,7 @@ void MappingComponent::publish_local_map(const Waiting& frame) {
 /// `header`: of the frame that the map has come to.
 void MappingComponent::publish_update(Header header) {
   if (behind_) header.frame_id(std::min(header.frame_id(), newest_keyframe_frame_));
-  const auto changes = mapper_.take_changes();
-  for (const auto id : changes.removed) context_.log().debug("keyframe {} culled", id);
-  mapping_component::publish_changes(changes, mapper_.epoch(), header, updates_);
+  mapping_component::publish_changes(mapper_.take_changes(), mapper_.epoch(), header, updates_);
 }
 
 void MappingComponent::report() {

@@ -147,7 +147,7 @@ TEST_F(CommandBag, RecordSubscribesAsTheFileOfOverridesSays) {
   const auto info = command({"topic", "info", "-v", "/camvox/frame_image"});
   EXPECT_THAT(info.output, HasSubstr("Reliability: BEST_EFFORT"));
   kill(recorder->pid(), SIGINT);
-  EXPECT_LE(recorder->wait(), 1) << recorder->output();  // best effort: some may be lost
+  EXPECT_EQ(recorder->wait(), 0) << recorder->output();
   EXPECT_EQ(stop(), 0) << container_->output();
 
   const auto bad = write("bad_record.yaml", "/a: {relability: reliable}\n");

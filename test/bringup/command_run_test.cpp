@@ -25,7 +25,7 @@ TEST_F(CommandRun, StopsCleanlyOnBothSignals) {
     run(kTicker);
     const auto begin = Clock::now();
     EXPECT_EQ(stop(signal), 0) << container_->output();
-    EXPECT_LT(Clock::now() - begin, 20s);
+    EXPECT_LT(Clock::now() - begin, 2s);
     EXPECT_THAT(container_->output(), HasSubstr("[rig]: stopped"));
   }
 }
@@ -45,7 +45,7 @@ TEST_F(CommandRun, HungComponentIsNamedAndDoesNotHoldUpTheExit) {
   ASSERT_TRUE(container_->wrote("[stuck]: a callback has been running")) << container_->output();
   const auto begin = Clock::now();
   EXPECT_EQ(stop(), 3);
-  EXPECT_LT(Clock::now() - begin, 20s);
+  EXPECT_LT(Clock::now() - begin, 2s);
   EXPECT_THAT(container_->output(), HasSubstr("[stuck]: hangs"));
   EXPECT_THAT(container_->output(), HasSubstr("exits without stuck, which hangs"));
 }

@@ -2,6 +2,8 @@
 
 #include <atomic>
 #include <filesystem>
+#include <fstream>
+#include <set>
 #include <thread>
 
 #include "camvox/dds/shared_memory.hpp"
@@ -18,7 +20,6 @@ using test::wait_until;
 using ::testing::Contains;
 using ::testing::IsEmpty;
 using ::testing::IsSupersetOf;
-using ::testing::Not;
 
 constexpr Port kPort{"cloud", topics::kCloud};
 
@@ -119,42 +120,45 @@ TEST(KilledSharedMemory, NextProcessStartsAndLeftoversAreRemoved) {
 
 constexpr std::chrono::milliseconds kStaleAge{3100};  // what is younger is left alone anyway
 
-/// Files of Fast DDS that were not there before.
-std::vector<std::string> new_files(const std::vector<std::string>& before) {
-  auto names = shared_memory_files();
-  std::erase_if(names, [&before](const std::string& name) {
-    return !name.starts_with("fast") ||
-           std::find(before.begin(), before.end(), name) != before.end();
-  });
-  return names;
+/// Files in shared memory that a process has mapped.
+std::vector<std::string> mapped_files(pid_t process) {
+  const std::string folder = "/dev/shm/";
+  std::ifstream maps("/proc/" + std::to_string(process) + "/maps");
+  std::set<std::string> names;
+  for (std::string line; std::getline(maps, line);) {
+    const auto start = line.find(folder + "fast");
+    if (start != std::string::npos) names.insert(line.substr(start + folder.size()));
+  }
+  return {names.begin(), names.end()};
 }
 
-TEST(StaleSharedMemory, OfLivingProcessesIsLeftAlone) {
-  const auto before = shared_memory_files();
-  test::TestContainer container(test::test_options(), shared_topics());
-  auto child = test::start_child("shared", "write");
-  ASSERT_TRUE(child.wrote("ready")) << child.output();
-  const auto living = new_files(before);
-  ASSERT_THAT(living, Not(IsEmpty()));
-  std::this_thread::sleep_for(kStaleAge);
+/// A child that writes through shared memory, and a container that may read it.
+class StaleSharedMemory : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    ASSERT_TRUE(child_.wrote("ready")) << child_.output();
+    living_ = mapped_files(child_.pid());
+    ASSERT_THAT(living_, Contains(::testing::StartsWith("fast_datasharing")));
+    std::this_thread::sleep_for(kStaleAge);
+  }
+
+  std::atomic<std::uint64_t> received_ = 0;
+  test::TestContainer container_{test::test_options(), shared_topics()};
+  test::ChildProcess child_ = test::start_child("shared", "write");
+  std::vector<std::string> living_;
+};
+
+TEST_F(StaleSharedMemory, OfLivingProcessesIsLeftAlone) {
   (void)dds::remove_stale_shared_memory();
-  EXPECT_THAT(new_files(before), IsSupersetOf(living));
-  std::atomic<std::uint64_t> received = 0;
-  container.component().subscribe<Cloud>(kPort, [&](const auto&) { ++received; });
-  container.activate();
-  EXPECT_TRUE(wait_until([&] { return received >= 5; })) << "the child's memory was taken away";
+  EXPECT_THAT(shared_memory_files(), IsSupersetOf(living_));
+  container_.component().subscribe<Cloud>(kPort, [&](const auto&) { ++received_; });
+  container_.activate();
+  EXPECT_TRUE(wait_until([&] { return received_ >= 5; })) << "the child's memory was taken away";
 }
 
 // In a user namespace of its own, or in another container, a process shares /dev/shm with processes
 // that it may not look into.
-TEST(StaleSharedMemory, OfProcessesThatCannotBeLookedIntoIsLeftAlone) {
-  const auto before = shared_memory_files();
-  test::TestContainer container(test::test_options(), shared_topics());
-  auto child = test::start_child("shared", "write");
-  ASSERT_TRUE(child.wrote("ready")) << child.output();
-  const auto living = new_files(before);
-  ASSERT_THAT(living, Contains(::testing::StartsWith("fast_datasharing")));
-  std::this_thread::sleep_for(kStaleAge);
+TEST_F(StaleSharedMemory, OfProcessesThatCannotBeLookedIntoIsLeftAlone) {
   test::ChildProcess stranger({"unshare",
                                "--user",
                                "--map-root-user",
@@ -167,7 +171,7 @@ TEST(StaleSharedMemory, OfProcessesThatCannotBeLookedIntoIsLeftAlone) {
     GTEST_SKIP() << "no user namespaces here: " << stranger.output();
   }
   ASSERT_EQ(code, 0) << stranger.output();
-  EXPECT_THAT(new_files(before), IsSupersetOf(living)) << stranger.output();
+  EXPECT_THAT(shared_memory_files(), IsSupersetOf(living_)) << stranger.output();
 }
 
 }  // namespace
