@@ -136,6 +136,27 @@ std::optional<PoseEstimate> Tracker::follow(const Frame& frame, FrameMatcher& ma
 std::optional<PoseEstimate> Tracker::find_again(const Frame& frame, FrameMatcher& matcher) {
   // At a place just proposed, nothing can be found before its map has come.
   if (map_.empty() || !map_.T_map_keyframe(reference_id_)) return std::nullopt;
+  auto estimate = state_ == TrackingState::kRelocalising ? find_at_hint(matcher) : std::nullopt;
+  if (!estimate) estimate = find_by_looks(matcher);
+  if (!estimate || !is_possible(frame, *estimate)) return std::nullopt;
+  return estimate;
+}
+
+// A view from elsewhere shares few features with the map that stand out among all of an image. The
+// proposed pose tells where each must be, if it is not too long ago.
+std::optional<PoseEstimate> Tracker::find_at_hint(FrameMatcher& matcher) const {
+  for (const double factor : {kWideSearch, 2.0 * kWideSearch}) {
+    matcher.clear();
+    const auto start =
+        refine(matcher, last_.T_map_camera, factor * config_.map_radius_px, std::nullopt);
+    if (!start) continue;
+    auto estimate = refine(matcher, start->T_world_camera, config_.map_radius_px, std::nullopt);
+    if (estimate && estimate->inliers >= config_.min_inliers_relocalised) return estimate;
+  }
+  return std::nullopt;
+}
+
+std::optional<PoseEstimate> Tracker::find_by_looks(FrameMatcher& matcher) const {
   const auto T_map_camera = matcher.match_anywhere(last_.T_map_camera);
   if (!T_map_camera) return std::nullopt;
   const auto start = if_ok(matcher.optimize(*T_map_camera));
@@ -143,7 +164,6 @@ std::optional<PoseEstimate> Tracker::find_again(const Frame& frame, FrameMatcher
   auto estimate =
       refine(matcher, start->T_world_camera, kWideSearch * config_.map_radius_px, std::nullopt);
   if (!estimate || estimate->inliers < config_.min_inliers_relocalised) return std::nullopt;
-  if (!is_possible(frame, *estimate)) return std::nullopt;
   return estimate;
 }
 

@@ -47,6 +47,8 @@ class Tracker {
   void start_map(Frame& frame, const FrameMatcher& matcher, FrameResult& result);
   [[nodiscard]] Estimate follow(const Frame& frame, FrameMatcher& matcher);
   [[nodiscard]] Estimate find_again(const Frame& frame, FrameMatcher& matcher);
+  [[nodiscard]] Estimate find_at_hint(FrameMatcher& matcher) const;
+  [[nodiscard]] Estimate find_by_looks(FrameMatcher& matcher) const;
   /// False, and counted, when nothing could have carried the camera there.
   [[nodiscard]] bool is_possible(const Frame& frame, const optimization::PoseEstimate& estimate);
   [[nodiscard]] Estimate refine(FrameMatcher& matcher,
