@@ -167,7 +167,8 @@ VerificationTask::Candidate LoopCloser::candidate(const PlaceScore& score) const
 std::optional<CorrectionTask> LoopCloser::consider(KeyframeId id,
                                                    const std::vector<VerifiedPlace>& places) {
   forget_old(id);
-  paths_m_.clear();
+  near_paths_m_.clear();
+  far_paths_m_.clear();
   bool accepted = false;
   LoopMeasurement newest;
   for (const auto& measurement : plausible_measurements(id, places)) {
@@ -244,24 +245,32 @@ std::vector<LoopMeasurement> LoopCloser::plausible_measurements(
   return measurements;
 }
 
-bool LoopCloser::agree(const LoopMeasurement& a, const LoopMeasurement& b) const {
-  constexpr double kNear_m = 60.0;  // farther apart than keyframes of a window are
-  constexpr double kFar_m = 1e3;
-  const auto length_m = [&](KeyframeId from, KeyframeId to) {
-    auto known = paths_m_.find(from);
-    if (known == paths_m_.end()) {
-      known = paths_m_.emplace(from, map_.path_lengths(from, kNear_m, loop_connections())).first;
+/// Of the path between two keyframes. Most are near each other, and found without a search of the
+/// whole map.
+double LoopCloser::path_length_m(KeyframeId from, KeyframeId to) const {
+  constexpr double kNear_m = 60.0;
+  constexpr double kNoPath_m = 1e3;
+  const auto find = [&](Paths& paths, double max_m) {
+    auto known = paths.find(from);
+    if (known == paths.end()) {
+      known = paths.emplace(from, map_.path_lengths(from, max_m, loop_connections())).first;
     }
     const auto found = known->second.find(to);
-    return found == known->second.end() ? kFar_m : found->second;
+    return found == known->second.end() ? kNoPath_m : found->second;
   };
+  const double near_m = find(near_paths_m_, kNear_m);
+  if (near_m < kNoPath_m) return near_m;
+  return find(far_paths_m_, std::numeric_limits<double>::infinity());
+}
+
+bool LoopCloser::agree(const LoopMeasurement& a, const LoopMeasurement& b) const {
   LoopPair pair;
   pair.a = &a;
   pair.b = &b;
   pair.T_query_a_query_b = map_.relative_pose(a.query_id, b.query_id);
   pair.T_match_a_match_b = map_.relative_pose(a.match_id, b.match_id);
-  pair.query_path_m = length_m(a.query_id, b.query_id);
-  pair.match_path_m = length_m(a.match_id, b.match_id);
+  pair.query_path_m = path_length_m(a.query_id, b.query_id);
+  pair.match_path_m = path_length_m(a.match_id, b.match_id);
   return consistent(pair, config_.drift);
 }
 
@@ -317,7 +326,6 @@ std::optional<Relocalisation> LoopCloser::relocalise(
   const VerifiedPlace* best = nullptr;
   for (const auto& place : places) {
     const bool usable = place.verification.status == VerificationStatus::kOk &&
-                        place.verification.inliers >= config_.min_inliers_lost &&
                         map_.find(place.match_id) != nullptr;
     if (!usable) continue;
     if (best == nullptr || place.verification.inliers > best->verification.inliers) best = &place;

@@ -18,17 +18,39 @@ constexpr int kMinShared = 15;
 }  // namespace
 
 void MapReplica::insert(const tracking::Keyframe& keyframe) {
-  auto& mine = keyframes_[keyframe.id];
+  const auto [place, is_new] = keyframes_.try_emplace(keyframe.id);
+  auto& mine = place->second;
   mine.features = std::make_shared<const features::FrameFeatures>(keyframe.features);
   mine.T_map_camera = keyframe.T_map_camera;
   mine.covariance = keyframe.covariance_camera;
-  if (mine.parent == 0 && keyframe.parent_id != keyframe.id) adopt(keyframe.parent_id, keyframe.id);
+  if (!is_new) return;
+  adopt(keyframe.parent_id, keyframe.id);
+  if (const auto next = std::next(place); next != keyframes_.end()) {
+    const bool stood_in_for = next->second.parent == 0 || next->second.awaited_parent != 0;
+    if (stood_in_for) adopt(next->second.awaited_parent, next->first);  // this one is nearer
+  }
+  const auto waiting = awaited_.find(keyframe.id);
+  if (waiting == awaited_.end()) return;
+  const auto children = std::move(waiting->second);
+  awaited_.erase(waiting);
+  for (const auto child : children) adopt(keyframe.id, child);
 }
 
+/// Parents are older than their children: so there is no circle, and all hangs together.
 void MapReplica::adopt(KeyframeId parent, KeyframeId child) {
-  const auto found = keyframes_.find(parent);
-  keyframes_.at(child).parent = found == keyframes_.end() ? 0 : parent;
-  if (found != keyframes_.end()) found->second.children.push_back(child);
+  const auto at = keyframes_.find(child);
+  if (at == keyframes_.end()) return;  // removed while its parent was awaited
+  auto& mine = at->second;
+  if (const auto old = keyframes_.find(mine.parent); old != keyframes_.end()) {
+    std::erase(old->second.children, child);
+  }
+  const bool sensible = parent != 0 && parent < child;
+  const bool known = sensible && keyframes_.contains(parent);
+  mine.awaited_parent = sensible && !known ? parent : 0;
+  if (mine.awaited_parent != 0) awaited_[parent].insert(child);
+  const KeyframeId predecessor = at == keyframes_.begin() ? 0 : std::prev(at)->first;
+  mine.parent = known ? parent : predecessor;
+  if (mine.parent != 0) keyframes_.at(mine.parent).children.push_back(child);
 }
 
 void MapReplica::apply(const MapChange& change) {
@@ -63,7 +85,10 @@ void MapReplica::remove(KeyframeId id) {
   if (const auto parent = keyframes_.find(gone.parent); parent != keyframes_.end()) {
     std::erase(parent->second.children, id);
   }
-  for (const auto child : gone.children) adopt(gone.parent, child);
+  for (const auto child : gone.children) {
+    const auto awaited = keyframes_.at(child).awaited_parent;
+    adopt(awaited != 0 ? awaited : gone.parent, child);
+  }
 }
 
 const MapReplica::Keyframe* MapReplica::find(KeyframeId id) const {

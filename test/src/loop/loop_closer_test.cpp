@@ -158,6 +158,92 @@ TEST_F(LoopCloserTest, VerifiesOnePlaceOnce) {
   EXPECT_EQ(count(), 2U);  // none was confirmed
 }
 
+VerifiedPlace looks_like(KeyframeId match_id) {
+  VerifiedPlace place;
+  place.match_id = match_id;
+  place.verification.status = VerificationStatus::kOk;
+  place.verification.covariance_query = 1e-4 * geometry::Matrix6d::Identity();
+  place.verification.inliers = 100;
+  return place;
+}
+
+// A warehouse: aisles of 100 m, 10 m apart, that all look alike, driven to and fro. Aisles 0 and 2
+// are 220 m of path apart, and the map is good enough to know that they are not one.
+TEST(LoopCloserWarehouseTest, TwinsFarApartAlongThePathAreAmbiguous) {
+  constexpr std::size_t kAisles = 10;
+  constexpr std::size_t kInAisle = 51;  // keyframes, 2 m apart
+  constexpr std::size_t kBetween = 4;
+  LoopCloser closer{LoopCloserConfig()};
+  KeyframeId id = 0;
+  const auto add = [&](const SE3& T_map_camera) {
+    tracking::Keyframe keyframe;
+    keyframe.id = ++id;
+    keyframe.parent_id = id - 1;
+    keyframe.T_map_camera = T_map_camera;
+    closer.insert(keyframe);
+  };
+  const auto at = [](double x_m, double z_m, double yaw_rad) {
+    return SE3(geometry::SO3::exp({0.0, yaw_rad, 0.0}), {x_m, 0.0, z_m});
+  };
+  for (std::size_t aisle = 0; aisle < kAisles; ++aisle) {
+    const bool up = aisle % 2 == 0;
+    const double x_m = 10.0 * static_cast<double>(aisle);
+    for (std::size_t i = 0; i < kInAisle; ++i) {
+      const double way_m = 2.0 * static_cast<double>(i);
+      add(at(x_m, up ? way_m : 100.0 - way_m, up ? 0.0 : M_PI));
+    }
+    for (std::size_t i = 1; i <= kBetween; ++i) {
+      add(at(x_m + 2.0 * static_cast<double>(i), up ? 102.0 : -2.0, M_PI / 2.0));
+    }
+  }
+  for (int i = 49; i >= 0; --i) add(at(2.0 * i, -6.0, -M_PI / 2.0));
+  for (std::size_t i = 0; i < 6; ++i) {
+    add(at(0.0, 2.0 * static_cast<double>(i), 0.0));
+    const KeyframeId in_aisle_0 = 1 + i;
+    const KeyframeId in_aisle_2 = in_aisle_0 + 2 * (kInAisle + kBetween);
+    EXPECT_FALSE(closer.consider(id, {looks_like(in_aisle_0), looks_like(in_aisle_2)}));
+    EXPECT_EQ(closer.statistics().ambiguous, i + 1);
+  }
+  EXPECT_TRUE(closer.loops().empty());
+  // One place alone is no contradiction.
+  for (std::size_t i = 6; i < 12; ++i) {
+    add(at(0.0, 2.0 * static_cast<double>(i), 0.0));
+    (void)closer.consider(id, {looks_like(1 + i)});
+  }
+  EXPECT_FALSE(closer.loops().empty());
+}
+
+// The loop's metre is shared by all steps of the way, whatever came first.
+TEST(CorrectTest, KeyframesThatCameBeforeTheirParentsStayTiedToTheMap) {
+  for (const auto& order : {std::vector<KeyframeId>{1, 2, 3, 4, 5, 6, 7, 8, 9, 10},
+                            std::vector<KeyframeId>{4, 5, 6, 7, 8, 9, 10, 1, 2, 3},
+                            std::vector<KeyframeId>{5, 6, 7, 8, 9, 10, 1, 2, 3}}) {  // 4 is lost
+    LoopCloserConfig config;
+    config.consistent_queries = 1;
+    LoopCloser closer(config);
+    for (const auto id : order) {
+      tracking::Keyframe keyframe;
+      keyframe.id = id;
+      keyframe.parent_id = id - 1;
+      keyframe.T_map_camera = SE3({}, {0.0, 0.0, static_cast<double>(id)});
+      closer.insert(keyframe);
+    }
+    auto place = looks_like(1);
+    place.verification.T_place_query = SE3({}, {0.5, 0.0, 9.0});
+    place.verification.covariance_query *= 0.01;
+    const auto task = closer.consider(10, {place});
+    ASSERT_TRUE(task);
+    const auto correction = correct(*task);
+    ASSERT_EQ(correction.T_map_camera.size(), order.size());
+    for (std::size_t i = 1; i < correction.T_map_camera.size(); ++i) {
+      const double step_m = correction.T_map_camera[i].second.translation().x() -
+                            correction.T_map_camera[i - 1].second.translation().x();
+      EXPECT_LT(step_m, order.size() == 10 ? 0.1 : 0.15) << correction.T_map_camera[i].first;
+      EXPECT_GT(step_m, 0.02) << correction.T_map_camera[i].first;
+    }
+  }
+}
+
 // A graph that rejects all its loops has nothing to say; it must not pass for a closed loop.
 TEST(CorrectTest, RejectedLoopsMoveNothing) {
   CorrectionTask task;

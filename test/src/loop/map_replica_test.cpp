@@ -54,5 +54,32 @@ TEST(MapReplicaTest, ChildrenOfARemovedOneGoToItsParent) {
   EXPECT_EQ(map.find(2)->parent, 0U);
 }
 
+TEST(MapReplicaTest, AnotherStandsInForAParentThatIsNotHereYet) {
+  MapReplica map;
+  const auto insert = [&map](KeyframeId id, KeyframeId parent_id) {
+    tracking::Keyframe keyframe;
+    keyframe.id = id;
+    keyframe.parent_id = parent_id;
+    map.insert(keyframe);
+  };
+  insert(4, 2);
+  EXPECT_EQ(map.find(4)->parent, 0U);
+  insert(3, 1);
+  EXPECT_EQ(map.find(4)->parent, 3U);
+  insert(2, 1);
+  EXPECT_EQ(map.find(4)->parent, 2U);
+  EXPECT_EQ(map.find(3)->parent, 2U);
+  EXPECT_EQ(map.find(2)->parent, 0U);
+  insert(1, 1);  // the first one names itself
+  EXPECT_EQ(map.find(1)->parent, 0U);
+  EXPECT_THAT(map.find(1)->children, ::testing::UnorderedElementsAre(2, 3));
+  EXPECT_THAT(map.find(2)->children, ElementsAre(4));
+  EXPECT_THAT(map.find(3)->children, IsEmpty());
+  insert(4, 3);  // sent again
+  EXPECT_EQ(map.find(4)->parent, 2U);
+  insert(5, 7);  // a parent that is younger than its child is none
+  EXPECT_EQ(map.find(5)->parent, 4U);
+}
+
 }  // namespace
 }  // namespace camvox::loop

@@ -30,7 +30,6 @@ struct LoopCloserConfig {
   int correction_interval = 10;   ///< Keyframes between corrections, unless the map is far off.
   double urgent_sigma = 3.0;      ///< Far off: by so many times what neighbours are worth.
   int essential_landmarks = 100;  ///< Keyframes that share as many are tied in the pose graph.
-  int min_inliers_lost = 30;      ///< Of an answer to a lost tracker.
   double same_pose_m = 0.5;       ///< Answers from two places farther apart contradict.
   double same_pose_deg = 5.0;     ///< The same, rotation.
   PlaceIndexConfig index;
@@ -51,7 +50,6 @@ struct LoopCloserConfig {
     field("correction_interval", self.correction_interval, config::at_least(1));
     field("urgent_sigma", self.urgent_sigma, config::greater_than(0.0));
     field("essential_landmarks", self.essential_landmarks, config::at_least(15));
-    field("min_inliers_lost", self.min_inliers_lost, config::at_least(10));
     field("same_pose_m", self.same_pose_m, config::greater_than(0.0));
     field("same_pose_deg", self.same_pose_deg, config::greater_than(0.0));
     field("index", self.index);
@@ -187,6 +185,7 @@ class LoopCloser {
   [[nodiscard]] std::vector<LoopMeasurement> plausible_measurements(
       KeyframeId id, const std::vector<VerifiedPlace>& places);
   [[nodiscard]] std::vector<LoopMeasurement> agreeing(const LoopMeasurement& newest) const;
+  [[nodiscard]] double path_length_m(KeyframeId from, KeyframeId to) const;
   [[nodiscard]] bool agree(const LoopMeasurement& a, const LoopMeasurement& b) const;
   void accept(const std::vector<LoopMeasurement>& set);
   [[nodiscard]] bool says_something_new(const LoopMeasurement& loop) const;
@@ -201,7 +200,9 @@ class LoopCloser {
   std::deque<LoopMeasurement> loops_;    ///< Accepted, by age.
   std::deque<KeyframeId> recent_;        ///< Keyframes taken in last.
   /// Of consider(): lengths of paths from a keyframe, computed once for all pairs of loops.
-  mutable std::map<KeyframeId, std::map<KeyframeId, double>> paths_m_;
+  using Paths = std::map<KeyframeId, std::map<KeyframeId, double>>;
+  mutable Paths near_paths_m_;
+  mutable Paths far_paths_m_;  ///< To all of the map.
   int keyframes_since_correction_ = 0;
   LoopStatistics statistics_;
 };

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -34,13 +35,16 @@ class MapReplica {
   struct Keyframe {
     std::shared_ptr<const features::FrameFeatures> features;
     geometry::SE3 T_map_camera;
-    KeyframeId parent = 0;                                       ///< 0: none.
+    KeyframeId parent = 0;          ///< 0: the oldest has none.
+    KeyframeId awaited_parent = 0;  ///< Not here yet: another stands in for it.
     geometry::Matrix6d covariance = geometry::Matrix6d::Zero();  ///< As tracking estimated it.
     std::map<KeyframeId, int> shared_landmarks;                  ///< With other keyframes.
     std::vector<KeyframeId> children;
   };
 
-  /// Takes a keyframe in; one with the same id is replaced.
+  /// Takes a keyframe in; one with the same id is replaced, and keeps its place in the tree. Until
+  /// its parent comes, the next older keyframe stands in for it: a map without a tie between two
+  /// parts would be torn apart there by the next correction.
   void insert(const tracking::Keyframe& keyframe);
   /// Keyframes that are not known are ignored. The children of a removed one go to its parent.
   void apply(const MapChange& change);
@@ -69,6 +73,7 @@ class MapReplica {
   void adopt(KeyframeId parent, KeyframeId child);
 
   std::map<KeyframeId, Keyframe> keyframes_;
+  std::map<KeyframeId, std::set<KeyframeId>> awaited_;  ///< Children by the parent they lack.
   std::uint64_t map_epoch_ = 0;
 };
 
