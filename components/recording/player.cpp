@@ -82,7 +82,13 @@ void Player::set_rate(double rate) {
   changed_.notify_all();
 }
 
-void Player::poke() { changed_.notify_all(); }
+void Player::poke() {
+  {
+    const std::lock_guard lock(mutex_);
+    ++pokes_;
+  }
+  changed_.notify_all();
+}
 
 PlayerState Player::state() const {
   const std::lock_guard lock(mutex_);
@@ -164,6 +170,18 @@ void Player::read_ahead() {
   changed_.notify_all();
 }
 
+/// False if the message may go as far as gate and pause are concerned; else waits until they may
+/// think otherwise.
+bool Player::hold(std::unique_lock<std::mutex>& lock, const PlayedMessage& message) {
+  if (gate_ && !gate_(message)) {
+    changed_.wait(lock, [this, pokes = pokes_] { return stopping_ || pokes_ != pokes; });
+    return true;
+  }
+  if (!state_.paused || step_) return false;
+  changed_.wait(lock, [this] { return stopping_ || !state_.paused || step_; });
+  return true;
+}
+
 /// The next message, once it is due; nothing at the end of the bag.
 std::optional<PlayedMessage> Player::next_due(std::unique_lock<std::mutex>& lock) {
   for (;;) {
@@ -174,12 +192,7 @@ std::optional<PlayedMessage> Player::next_due(std::unique_lock<std::mutex>& lock
       clock_runs_ = true;
       restart_clock(front.log_time_ns);
     }
-    const bool held = gate_ && !gate_(front);
-    const bool waits = state_.paused && !step_;
-    if (held || waits) {
-      changed_.wait(lock);
-      continue;
-    }
+    if (hold(lock, front)) continue;
     const auto due = due_time(front.log_time_ns);
     if (step_ || options_.as_fast_as_possible || Clock::now() >= due) break;
     changed_.wait_until(lock, due);

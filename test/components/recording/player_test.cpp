@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include <atomic>
 #include <chrono>
 #include <thread>
 
@@ -53,6 +54,12 @@ class Playing {
 PlayerOptions fast() {
   PlayerOptions options;
   options.as_fast_as_possible = true;
+  return options;
+}
+
+PlayerOptions paused_fast() {
+  auto options = fast();
+  options.start_paused = true;
   return options;
 }
 
@@ -141,6 +148,29 @@ TEST(Player, GateHoldsBackUntilPoked) {
   playing.player.poke();
   playing.player.wait_until_finished();
   EXPECT_THAT(playing.contents(), ElementsAre(0, 1, 2, 9, 3, 4));
+}
+
+/// The poke comes just when the gate has said no and the player does not wait yet.
+TEST(Player, APokeIsNotLostBeforeTheWaitBegins) {
+  const TemporaryFolder folder;
+  std::atomic<bool> open = false;
+  std::thread poker;
+  Player* player = nullptr;
+  Playing playing(small_bag(folder), paused_fast(), [&](const PlayedMessage& message) {
+    const bool answer = message.cdr.back() != 2 || open;
+    if (answer || poker.joinable()) return answer;
+    poker = std::thread([&] {
+      open = true;
+      player->poke();
+    });
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));  // as if preempted here
+    return answer;
+  });
+  player = &playing.player;
+  player->set_paused(false);
+  EXPECT_TRUE(playing.wait_for_count(6));
+  playing.player.stop();
+  poker.join();
 }
 
 TEST(Player, ReadAheadIsBoundedAndStillCompletes) {

@@ -85,6 +85,7 @@ class Player {
   bool read_pass();
   void push(PlayedMessage message);
   void play();
+  bool hold(std::unique_lock<std::mutex>& lock, const PlayedMessage& message);
   std::optional<PlayedMessage> next_due(std::unique_lock<std::mutex>& lock);
   [[nodiscard]] SteadyTime due_time(std::int64_t log_time_ns) const;
   void restart_clock(std::int64_t log_time_ns);
@@ -102,6 +103,7 @@ class Player {
   bool read_all_ = false;
   bool stopping_ = false;
   bool step_ = false;
+  std::uint64_t pokes_ = 0;
   PlayerState state_;
   // The clock: log time `clock_origin_ns_` was, or will be, at `clock_start_`.
   std::int64_t clock_origin_ns_ = 0;
