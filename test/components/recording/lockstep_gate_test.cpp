@@ -25,6 +25,55 @@ TEST(LockstepGate, AFrameThatWasLeftOutDoesNotStopTheRest) {
   EXPECT_TRUE(gate.may_send());
 }
 
+/// Sync tells of an image that makes no frame; the others never hear of it.
+TEST(LockstepGate, LeftOutImagesInARowHoldNothingUp) {
+  LockstepGate gate({"sync", "tracking"}, 2);
+  gate.sent(100);
+  gate.sent(200);
+  EXPECT_FALSE(gate.may_send());
+  gate.done("sync", 100, 0);
+  gate.done("sync", 200, 0);
+  EXPECT_TRUE(gate.may_send());
+  gate.sent(300);
+  gate.sent(400);
+  EXPECT_FALSE(gate.may_send());
+}
+
+TEST(LockstepGate, ALeftOutImageDoesNotFinishTheOnesBeforeIt) {
+  LockstepGate gate({"sync"}, 2);
+  gate.sent(100);
+  gate.sent(200);
+  gate.done("sync", 200, 0);
+  EXPECT_TRUE(gate.may_send());
+  gate.sent(300);
+  EXPECT_FALSE(gate.may_send()) << "the first still waits for its scan";
+  gate.done("sync", 100, 1);
+  EXPECT_TRUE(gate.may_send());
+}
+
+/// Half the time that the camera takes for its rows lies between a stamp and the report.
+TEST(LockstepGate, AReportMayBeALittleLaterThanTheStamp) {
+  LockstepGate gate({"sync", "tracking"}, 3);
+  for (const std::int64_t stamp_ns : {100, 200, 300}) gate.sent(stamp_ns);
+  gate.done("sync", 215, 0);
+  EXPECT_TRUE(gate.may_send());
+  gate.sent(400);
+  gate.done("sync", 315, 0);
+  EXPECT_TRUE(gate.may_send());
+  gate.sent(500);
+  EXPECT_FALSE(gate.may_send()) << "100, 400 and 500 are under way";
+}
+
+/// Sync says nothing about an image that comes twice, and a recording may hold each image raw and
+/// compressed.
+TEST(LockstepGate, AnImageSentTwiceCountsOnce) {
+  LockstepGate gate({"sync"}, 1);
+  gate.sent(100);
+  gate.done("sync", 100, 1);
+  gate.sent(100);
+  EXPECT_TRUE(gate.may_send());
+}
+
 TEST(LockstepGate, IgnoresStrangersAndOldReports) {
   LockstepGate gate({"tracking"}, 1);
   gate.sent(100);
