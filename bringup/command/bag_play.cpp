@@ -158,6 +158,12 @@ int play(const PlayOptions& options, const CommonOptions& common) {
   component.finish();
   const auto state = replay.player().state();
   require_ok(state.status);
+  if (state.refused > 0) {
+    fmt::print(stderr,
+               "camvox: warning: {} messages were not sent, the first because of {}\n",
+               state.refused,
+               state.refusal);
+  }
   fmt::print("{} messages sent\n", state.sent);
   return Exit::kDone;
 }

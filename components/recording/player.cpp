@@ -156,13 +156,27 @@ bool Player::read_pass() {
     if (stopping_) return false;
   }
   const std::lock_guard lock(mutex_);
-  state_.status = cursor.status();
+  if (state_.status.ok()) state_.status = cursor.status();
   return any && cursor.status().ok();
 }
 
-void Player::read_ahead() {
-  while (read_pass() && options_.loop) {
+/// Runs the body of a thread. What it throws ends playing, and is told as damage of the bag is.
+template <typename Body>
+void Player::guard(Body&& body) {
+  try {
+    body();
+  } catch (const std::exception& error) {
+    const std::lock_guard lock(mutex_);
+    state_.status = {storage::StatusCode::kInvalid,
+                     std::string("playing ended early: ") + error.what()};
   }
+}
+
+void Player::read_ahead() {
+  guard([this] {
+    while (read_pass() && options_.loop) {
+    }
+  });
   {
     const std::lock_guard lock(mutex_);
     read_all_ = true;
@@ -204,19 +218,39 @@ std::optional<PlayedMessage> Player::next_due(std::unique_lock<std::mutex>& lock
   return message;
 }
 
-void Player::play() {
+/// Why the message could not be sent, or "": one that cannot is no reason to keep back the rest.
+std::string Player::try_publish(PlayedMessage&& message) {
+  try {
+    publish_(std::move(message));
+    return {};
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+}
+
+void Player::play_all() {
   std::unique_lock lock(mutex_);
   while (auto message = next_due(lock)) {
     state_.position_ns = message->log_time_ns;
     if (state_.paused) restart_clock(message->log_time_ns);
     lock.unlock();
     changed_.notify_all();
-    publish_(std::move(*message));
+    auto problem = try_publish(std::move(*message));
     lock.lock();
-    ++state_.sent;
+    if (problem.empty()) {
+      ++state_.sent;
+    } else if (state_.refused++ == 0) {
+      state_.refusal = std::move(problem);
+    }
   }
-  state_.finished = true;
-  lock.unlock();
+}
+
+void Player::play() {
+  guard([this] { play_all(); });
+  {
+    const std::lock_guard lock(mutex_);
+    state_.finished = true;
+  }
   changed_.notify_all();
 }
 

@@ -14,6 +14,8 @@
 namespace camvox {
 namespace {
 
+using camvox_interfaces::msg::Progress;
+
 constexpr std::int64_t kSecond_ns = 1'000'000'000;
 /// At the end, after so long without a frame done the last ones are given up. A loop that is closed
 /// last may take minutes on a busy machine.
@@ -85,21 +87,22 @@ ReplayComponent::ReplayComponent(Context& context)
   context.on_parameter_change<ReplayConfig>(
       config_, [this](const ReplayConfig& next) { change(next); }, {"rate", "paused"});
   if (!config_.lockstep && !config_.exit_at_end) return;
-  context.subscribe<camvox_interfaces::msg::Progress>(
-      {"progress", topics::kProgress},
-      [this](const Sample<camvox_interfaces::msg::Progress>& sample) {
-        const auto& name = sample->component_name();
-        const auto& header = sample->header();
-        gate_.done(
-            {name.data(), strnlen(name.data(), name.size())}, header.stamp_ns(), header.frame_id());
-        if (player_) player_->poke();
-        last_activity_ns_ = context_.now_ns();
-      },
-      {.qos = qos::kKeyframes,
-       .required = config_.lockstep && !config_.lockstep_components.empty()});
+  const bool waits = config_.lockstep && !config_.lockstep_components.empty();
+  context.subscribe<Progress>({"progress", topics::kProgress},
+                              [this](const auto& progress) { add_progress(*progress); },
+                              {.qos = qos::kKeyframes, .required = waits});
 }
 
 ReplayComponent::~ReplayComponent() = default;
+
+void ReplayComponent::add_progress(const Progress& progress) {
+  const auto& name = progress.component_name();
+  const auto& header = progress.header();
+  gate_.done(
+      {name.data(), strnlen(name.data(), name.size())}, header.stamp_ns(), header.frame_id());
+  if (player_) player_->poke();
+  last_activity_ns_ = context_.now_ns();
+}
 
 void ReplayComponent::change(const ReplayConfig& config) {
   config_ = config;
@@ -199,17 +202,29 @@ void ReplayComponent::advertise_topics(const storage::BagReader& bag) {
 }
 
 void ReplayComponent::send(recording::PlayedMessage&& message) {
-  if (is_frame_[message.topic]) gate_.sent(header_stamp_ns(message.cdr));
-  auto& publisher = publishers_[message.topic];
-  auto loan = publisher.loan();
-  loan->cdr = std::move(message.cdr);
-  publisher.publish(std::move(loan));
+  const bool is_frame = is_frame_[message.topic];
+  const std::int64_t stamp_ns = header_stamp_ns(message.cdr);
+  if (is_frame) gate_.sent(stamp_ns);
+  try {
+    auto& publisher = publishers_[message.topic];
+    auto loan = publisher.loan();
+    loan->cdr = std::move(message.cdr);
+    publisher.publish(std::move(loan));
+  } catch (...) {
+    if (is_frame) gate_.left_out(stamp_ns);
+    throw;
+  }
 }
 
 void ReplayComponent::report() {
   const auto state = player_->state();
   context_.diagnostics().set("sent", state.sent);
   context_.diagnostics().set("rate", state.rate);
+  context_.diagnostics().set("refused", state.refused);
+  if (state.refused > 0 && !std::exchange(refusal_reported_, true)) {
+    context_.log().warn("a message was not sent: {} (more of them are only counted)",
+                        state.refusal);
+  }
   if (!state.finished) return;
   if (!end_reported_) return report_end(state);
   if (config_.exit_at_end) exit_when_done();
@@ -232,11 +247,13 @@ void ReplayComponent::report_end(const recording::PlayerState& state) {
   end_reported_ = true;
   last_activity_ns_ = context_.now_ns();
   if (state.status.ok()) {
-    context_.log().info("end of {}: {} messages sent", config_.bag, state.sent);
-  } else {
-    context_.diagnostics().report(HealthLevel::kError, state.status.message());
-    context_.log().error("{}", state.status.message());
+    const auto refused =
+        state.refused > 0 ? fmt::format(", {} refused", state.refused) : std::string();
+    context_.log().info("end of {}: {} messages sent{}", config_.bag, state.sent, refused);
+    return;
   }
+  context_.diagnostics().report(HealthLevel::kError, state.status.message());
+  context_.log().error("{}", state.status.message());
 }
 
 }  // namespace camvox

@@ -113,6 +113,33 @@ TEST_F(CommandRun, EndsWithTheBagThatItReplays) {
   EXPECT_THAT(result.output, HasSubstr("0 messages sent"));
 }
 
+/// A bag of images that nobody can read, with these numbers of bytes and a stamp of their own each.
+std::string write_bag(const std::string& folder, const std::vector<std::size_t>& sizes) {
+  std::filesystem::remove_all(folder);
+  auto writer = storage::BagWriter::create(folder);
+  storage::BagTopic topic;
+  topic.name = "/camera/image_raw";
+  topic.type = "sensor_msgs/msg/Image";
+  const auto number = (*writer)->add_topic(topic);
+  std::int64_t time_ns = 0;
+  for (const auto size : sizes) {
+    time_ns += 100'000'000;
+    std::vector<std::byte> cdr(size, std::byte{'x'});
+    if (size > 4) cdr[4] = static_cast<std::byte>(time_ns / 100'000'000);
+    EXPECT_TRUE((*writer)->write(*number, time_ns, time_ns, cdr).ok());
+  }
+  EXPECT_TRUE((*writer)->close().ok());
+  return folder;
+}
+
+TEST_F(CommandRun, AMessageThatCannotBeSentCostsOnlyItself) {
+  const auto bag = write_bag(write("gap", "") + ".bag", {16, 0, 16});
+  const auto result = command({"run", write("rig.yaml", kTicker), "--bag", bag});
+  EXPECT_EQ(result.exit_code, 0) << result.output;
+  EXPECT_THAT(result.output, HasSubstr("2 messages sent, 1 refused"));
+  EXPECT_THAT(result.output, HasSubstr("a message was not sent: sensor_msgs/msg/Image: invalid"));
+}
+
 TEST_F(CommandRun, ParameterFilesServeEveryComponentThatHasTheParameter) {
   const auto rig = write("shared.yaml", "hang_s: 0.002\nunused_block: {x: 1}\n");
   const auto result =

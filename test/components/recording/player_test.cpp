@@ -173,6 +173,34 @@ TEST(Player, APokeIsNotLostBeforeTheWaitBegins) {
   poker.join();
 }
 
+TEST(Player, AMessageThatCannotBePublishedCostsOnlyItself) {
+  const TemporaryFolder folder;
+  std::vector<int> contents;
+  Player player(open_bag(small_bag(folder)), fast(), [&](PlayedMessage&& message) {
+    if (message.cdr.back() % 2 == 1) throw std::runtime_error("odd");
+    contents.push_back(message.cdr.back());
+  });
+  player.start();
+  player.wait_until_finished();
+  EXPECT_THAT(contents, ElementsAre(0, 2, 4));
+  EXPECT_EQ(player.state().sent, 3U);
+  EXPECT_EQ(player.state().refused, 3U);
+  EXPECT_EQ(player.state().refusal, "odd");
+  EXPECT_TRUE(player.state().status.ok());
+}
+
+TEST(Player, WhatItsThreadsThrowEndsPlayingAndIsTold) {
+  const TemporaryFolder folder;
+  Playing playing(small_bag(folder), fast(), [](const PlayedMessage& message) {
+    if (message.cdr.back() == 2) throw std::runtime_error("no such topic");
+    return true;
+  });
+  playing.player.wait_until_finished();
+  playing.player.stop();
+  EXPECT_THAT(playing.contents(), ElementsAre(0, 1));
+  EXPECT_THAT(playing.player.state().status.message(), ::testing::HasSubstr("no such topic"));
+}
+
 TEST(Player, ReadAheadIsBoundedAndStillCompletes) {
   const TemporaryFolder folder;
   auto options = fast();

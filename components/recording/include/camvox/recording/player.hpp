@@ -39,6 +39,8 @@ struct PlayedMessage {
 struct PlayerState {
   std::int64_t position_ns = 0;  ///< Log time of the last message sent.
   std::uint64_t sent = 0;
+  std::uint64_t refused = 0;  ///< Could not be sent: `publish` threw.
+  std::string refusal;        ///< Why the first of those.
   double rate = 1.0;
   bool paused = false;
   bool finished = false;
@@ -46,8 +48,9 @@ struct PlayerState {
 };
 
 /// Plays a bag in the order of its log times. One thread reads ahead, another sends each message
-/// when its time has come; `publish` is called on that thread. `gate` may hold a message back (for
-/// lockstep): it is asked before each message, and again whenever `poke` was called.
+/// when its time has come; `publish` is called on that thread, and what it throws costs only that
+/// message. `gate` may hold a message back (for lockstep): it is asked before each message, and
+/// again whenever `poke` was called.
 class Player {
  public:
   using Publish = std::function<void(PlayedMessage&& message)>;
@@ -84,7 +87,11 @@ class Player {
   void read_ahead();
   bool read_pass();
   void push(PlayedMessage message);
+  template <typename Body>
+  void guard(Body&& body);
   void play();
+  void play_all();
+  std::string try_publish(PlayedMessage&& message);
   bool hold(std::unique_lock<std::mutex>& lock, const PlayedMessage& message);
   std::optional<PlayedMessage> next_due(std::unique_lock<std::mutex>& lock);
   [[nodiscard]] SteadyTime due_time(std::int64_t log_time_ns) const;

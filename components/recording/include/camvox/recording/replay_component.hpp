@@ -86,6 +86,7 @@ class ReplayComponent final : public Component {
   void advertise_topics(const storage::BagReader& bag);
   void send(recording::PlayedMessage&& message);
   void play_when_connected();
+  void add_progress(const camvox_interfaces::msg::Progress& progress);
   void report();
   void report_end(const recording::PlayerState& state);
   void exit_when_done();
@@ -93,6 +94,7 @@ class ReplayComponent final : public Component {
   Context& context_;
   ReplayConfig config_;
   recording::LockstepGate gate_;
+  bool refusal_reported_ = false;
   Publisher<rosgraph_msgs::msg::Clock> clock_;
   std::vector<Publisher<RawMessage>> publishers_;  // by number of the bag's topic
   std::vector<bool> is_frame_;                     // same
