@@ -227,11 +227,11 @@ void ReplayComponent::report() {
   }
   if (!state.finished) return;
   if (!end_reported_) return report_end(state);
-  if (config_.exit_at_end) exit_when_done();
+  if (config_.exit_at_end) exit_when_done(state);
 }
 
 /// Time alone says little: a busy machine may take long for the last frames.
-void ReplayComponent::exit_when_done() {
+void ReplayComponent::exit_when_done(const recording::PlayerState& state) {
   const double silent_s = 1e-9 * static_cast<double>(context_.now_ns() - last_activity_ns_);
   if (silent_s < config_.settle_s || !context_.all_idle()) return;
   const auto behind = gate_.behind();
@@ -241,6 +241,7 @@ void ReplayComponent::exit_when_done() {
     throw std::runtime_error(
         fmt::format("the last frames never got through {}", fmt::join(behind, ", ")));
   }
+  if (!state.status.ok()) throw std::runtime_error(state.status.message());
 }
 
 void ReplayComponent::report_end(const recording::PlayerState& state) {
@@ -252,6 +253,8 @@ void ReplayComponent::report_end(const recording::PlayerState& state) {
     context_.log().info("end of {}: {} messages sent{}", config_.bag, state.sent, refused);
     return;
   }
+  // With exit_at_end the others first finish what they have got.
+  if (!config_.exit_at_end) throw std::runtime_error(state.status.message());
   context_.diagnostics().report(HealthLevel::kError, state.status.message());
   context_.log().error("{}", state.status.message());
 }

@@ -140,6 +140,21 @@ TEST_F(CommandRun, AMessageThatCannotBeSentCostsOnlyItself) {
   EXPECT_THAT(result.output, HasSubstr("a message was not sent: sensor_msgs/msg/Image: invalid"));
 }
 
+TEST_F(CommandRun, ExitCodeTellsThatARecordingIsDamaged) {
+  const auto bag = write_bag(write("damaged", "") + ".bag", {16});
+  for (const auto& entry : std::filesystem::directory_iterator(bag)) {
+    std::fstream file(entry.path(), std::ios::binary | std::ios::in | std::ios::out);
+    const std::string bytes{std::istreambuf_iterator<char>(file), {}};
+    const auto message = bytes.find("xxxx\1xxx");
+    if (message == std::string::npos) continue;
+    file.clear();
+    file.seekp(static_cast<std::streamoff>(message)).put('y');
+  }
+  const auto result = command({"run", write("rig.yaml", kTicker), "--bag", bag});
+  EXPECT_EQ(result.exit_code, 3) << result.output;
+  EXPECT_THAT(result.output, HasSubstr("CRC"));
+}
+
 TEST_F(CommandRun, ParameterFilesServeEveryComponentThatHasTheParameter) {
   const auto rig = write("shared.yaml", "hang_s: 0.002\nunused_block: {x: 1}\n");
   const auto result =

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <filesystem>
+#include <fstream>
 #include <string>
 #include <vector>
 
@@ -76,6 +77,19 @@ inline void write_bag(const std::string& folder, const std::vector<TestMessage>&
     ASSERT_TRUE(status.ok()) << status.message();
   }
   ASSERT_TRUE((*bag)->close().ok());
+}
+
+/// Changes a byte of the first message in a bag of write_bag, so that its chunk's CRC is wrong.
+inline void damage_bag(const std::string& folder) {
+  const auto file = std::filesystem::path(folder) /
+                    (std::filesystem::path(folder).filename().string() + "_0.mcap");
+  const auto cdr = stamped_cdr(kStart_ns, 0);
+  std::ifstream in(file, std::ios::binary);
+  std::string bytes{std::istreambuf_iterator<char>(in), {}};
+  const auto at = bytes.find(std::string(cdr.begin(), cdr.end() - 1));
+  ASSERT_NE(at, std::string::npos);
+  bytes[at + cdr.size() - 1] ^= 1;
+  std::ofstream(file, std::ios::binary) << bytes;
 }
 
 inline std::unique_ptr<storage::BagReader> open_bag(const std::string& folder) {

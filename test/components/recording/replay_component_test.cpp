@@ -83,6 +83,22 @@ TEST(ReplayComponent, LockstepSendsTheNextFrameWhenTheLastIsDone) {
   ASSERT_TRUE(run_until(fake, [&] { return logged(fake, "4 messages sent"); }));
 }
 
+TEST(ReplayComponent, ARecordingThatCannotBeReadToTheEndIsAnError) {
+  for (const bool exit_at_end : {true, false}) {
+    const TemporaryFolder folder;
+    recording::write_bag(folder.file("bag"), {{"/a", 0.0, 7}});
+    recording::damage_bag(folder.file("bag"));
+    FakeContext fake;
+    fake.set_parameter("bag", folder.file("bag"));
+    fake.set_parameter("exit_at_end", exit_at_end);
+    ReplayComponent replay(fake);
+    replay.start();
+    EXPECT_THAT([&] { run_until(fake, [&] { return fake.exit_requested(); }); },
+                ::testing::ThrowsMessage<std::runtime_error>(::testing::HasSubstr("CRC")));
+    EXPECT_EQ(fake.exit_requested(), exit_at_end);
+  }
+}
+
 TEST(ReplayComponent, AsksForTheExitOnceNothingIsReportedDoneAnyMore) {
   const TemporaryFolder folder;
   recording::write_bag(folder.file("bag"), {{"/a", 0.0, 7}});

@@ -89,7 +89,7 @@ class ReplayComponent final : public Component {
   void add_progress(const camvox_interfaces::msg::Progress& progress);
   void report();
   void report_end(const recording::PlayerState& state);
-  void exit_when_done();
+  void exit_when_done(const recording::PlayerState& state);
 
   Context& context_;
   ReplayConfig config_;
