@@ -28,6 +28,19 @@ dds::ComponentSettings settings_of(const ComponentConfig& config) {
   return settings;
 }
 
+const char* to_string(ComponentState state) {
+  switch (state) {
+    case ComponentState::kRunning:
+      return "running";
+    case ComponentState::kRestarting:
+      return "restarting";
+    case ComponentState::kHung:
+      return "hung";
+    default:
+      return "stopped";
+  }
+}
+
 double to_seconds(std::chrono::nanoseconds time) {
   return std::chrono::duration<double>(time).count();
 }
@@ -240,6 +253,7 @@ Diagnostics::Status ComponentSlot::health() {
     status.message = "error: " + now.last_error;
   }
   reported_failures_ = now.errors;
+  status.values["state"] = to_string(now.state);
   status.values["errors"] = std::to_string(now.errors);
   status.values["restarts"] = std::to_string(now.restarts);
   if (context_ == nullptr) return status;

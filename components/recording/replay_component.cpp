@@ -15,11 +15,13 @@ namespace camvox {
 namespace {
 
 using camvox_interfaces::msg::Progress;
+using diagnostic_msgs::msg::DiagnosticArray;
 
 constexpr std::int64_t kSecond_ns = 1'000'000'000;
-/// At the end, after so long without a frame done the last ones are given up. A loop that is closed
-/// last may take minutes on a busy machine.
+/// After so long without a frame done, those under way are given up. A loop that is closed may take
+/// minutes on a busy machine.
 constexpr double kLongestSilence_s = 300.0;
+constexpr std::chrono::milliseconds kLookPeriod{200};
 /// How often in a row topics must be found connected, as the other side may see it a little later.
 constexpr int kLooksConnected = 3;
 
@@ -91,6 +93,10 @@ ReplayComponent::ReplayComponent(Context& context)
   context.subscribe<Progress>({"progress", topics::kProgress},
                               [this](const auto& progress) { add_progress(*progress); },
                               {.qos = qos::kKeyframes, .required = waits});
+  if (!waits) return;
+  context.subscribe<DiagnosticArray>({"diagnostics", topics::kDiagnostics},
+                                     [this](const auto& health) { add_health(*health); },
+                                     {.qos = qos::kDiagnostics, .required = false});
 }
 
 ReplayComponent::~ReplayComponent() = default;
@@ -102,6 +108,22 @@ void ReplayComponent::add_progress(const Progress& progress) {
       {name.data(), strnlen(name.data(), name.size())}, header.stamp_ns(), header.frame_id());
   if (player_) player_->poke();
   last_activity_ns_ = context_.now_ns();
+  looks_held_ = 0;
+}
+
+/// Remembers which of the components that lockstep waits for have stopped.
+void ReplayComponent::add_health(const DiagnosticArray& health) {
+  for (const auto& status : health.status()) {
+    for (const auto& name : config_.lockstep_components) {
+      if (status.name() != status.hardware_id() + ": " + name) continue;
+      const auto& values = status.values();
+      const bool stopped = std::any_of(values.begin(), values.end(), [](const auto& value) {
+        return value.key() == "state" && value.value() == "stopped";
+      });
+      stopped_.erase(name);
+      if (stopped) stopped_[name] = status.message();
+    }
+  }
 }
 
 void ReplayComponent::change(const ReplayConfig& config) {
@@ -153,7 +175,7 @@ void ReplayComponent::start() {
                      clock_.publish(std::move(clock));
                    });
   }
-  context_.every(std::chrono::milliseconds(200), [this] {
+  context_.every(kLookPeriod, [this] {
     if (playing_) report();
     play_when_connected();
   });
@@ -225,9 +247,40 @@ void ReplayComponent::report() {
     context_.log().warn("a message was not sent: {} (more of them are only counted)",
                         state.refusal);
   }
-  if (!state.finished) return;
+  if (!state.finished) return check_lockstep(state);
   if (!end_reported_) return report_end(state);
   if (config_.exit_at_end) exit_when_done(state);
+}
+
+bool ReplayComponent::any_stopped(const std::vector<std::string>& names) const {
+  return std::any_of(
+      names.begin(), names.end(), [this](const auto& name) { return stopped_.contains(name); });
+}
+
+std::string ReplayComponent::with_reasons(std::vector<std::string> names) const {
+  for (auto& name : names) {
+    if (const auto found = stopped_.find(name); found != stopped_.end()) {
+      name += " (" + found->second + ")";
+    }
+  }
+  return fmt::format("{}", fmt::join(names, ", "));
+}
+
+/// Throws when the next frame waits for one that has stopped, or nothing has moved for very long.
+void ReplayComponent::check_lockstep(const recording::PlayerState& state) {
+  const bool moves = std::exchange(last_sent_, state.sent) != state.sent;
+  if (moves || state.paused || gate_.may_send()) {
+    looks_held_ = 0;
+    return;
+  }
+  // Counted, not taken from a clock that may be set meanwhile.
+  const double held_s = std::chrono::duration<double>(++looks_held_ * kLookPeriod).count();
+  const auto missing = gate_.waits_for();
+  if (held_s < (any_stopped(missing) ? config_.settle_s : kLongestSilence_s)) return;
+  looks_held_ = 0;
+  if (config_.exit_at_end) context_.request_exit();
+  throw std::runtime_error(fmt::format(
+      "for {:.0f} s no frame was done: lockstep waits for {}", held_s, with_reasons(missing)));
 }
 
 /// Time alone says little: a busy machine may take long for the last frames.
@@ -235,11 +288,11 @@ void ReplayComponent::exit_when_done(const recording::PlayerState& state) {
   const double silent_s = 1e-9 * static_cast<double>(context_.now_ns() - last_activity_ns_);
   if (silent_s < config_.settle_s || !context_.all_idle()) return;
   const auto behind = gate_.behind();
-  if (!behind.empty() && silent_s < kLongestSilence_s) return;
+  if (!behind.empty() && !any_stopped(behind) && silent_s < kLongestSilence_s) return;
   context_.request_exit();
   if (!behind.empty()) {
     throw std::runtime_error(
-        fmt::format("the last frames never got through {}", fmt::join(behind, ", ")));
+        fmt::format("the last frames never got through {}", with_reasons(behind)));
   }
   if (!state.status.ok()) throw std::runtime_error(state.status.message());
 }

@@ -155,6 +155,24 @@ TEST_F(CommandRun, ExitCodeTellsThatARecordingIsDamaged) {
   EXPECT_THAT(result.output, HasSubstr("CRC"));
 }
 
+TEST_F(CommandRun, LockstepEndsWhenWhoItWaitsForHasStopped) {
+  const auto bag = write_bag(write("held", "") + ".bag", {16, 16, 16});
+  const auto result = command({"run",
+                               write("rig.yaml",
+                                     "components:\n"
+                                     "  - {plugin: test::FrameReporter, name: reporter,\n"
+                                     "     parameters: {fail: true}}\n"
+                                     "  - {plugin: camvox::ReplayComponent, name: replay,\n"
+                                     "     parameters: {bag: .,\n"
+                                     "     lockstep: true, frames_in_flight: 1,\n"
+                                     "     lockstep_components: [reporter]}}\n"),
+                               "--bag",
+                               bag});
+  EXPECT_EQ(result.exit_code, 3) << result.output;
+  EXPECT_THAT(result.output,
+              HasSubstr("lockstep waits for reporter (stopped after an error: bad frame)"));
+}
+
 TEST_F(CommandRun, ParameterFilesServeEveryComponentThatHasTheParameter) {
   const auto rig = write("shared.yaml", "hang_s: 0.002\nunused_block: {x: 1}\n");
   const auto result =

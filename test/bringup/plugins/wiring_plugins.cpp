@@ -1,4 +1,5 @@
 // Components that differ only in what they ask for, for the checks before the start.
+#include <chrono>
 #include <stdexcept>
 
 #include "camvox/component/component.hpp"
@@ -68,10 +69,22 @@ class ThrowingInt : public camvox::Component {
   explicit ThrowingInt(Context&) { throw 42; }
 };
 
-/// Reports every frame.
+struct ReporterConfig {
+  bool fail = false;
+
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& field) {
+    field("fail", self.fail);
+  }
+};
+
+/// Reports every frame, or fails soon.
 class FrameReporter : public camvox::Component {
  public:
-  explicit FrameReporter(Context& context) : progress_(context) {}
+  explicit FrameReporter(Context& context) : progress_(context) {
+    if (!context.parameters<ReporterConfig>().fail) return;
+    context.every(std::chrono::milliseconds(100), [] { throw std::runtime_error("bad frame"); });
+  }
 
  private:
   camvox::ProgressReporter progress_;

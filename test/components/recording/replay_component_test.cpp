@@ -9,11 +9,13 @@
 
 #include "bag_files.hpp"
 #include "camvox/component/fake_context.hpp"
+#include "camvox/interfaces/diagnostic_msgs.hpp"
 
 namespace camvox {
 namespace {
 
 using camvox_interfaces::msg::Progress;
+using diagnostic_msgs::msg::DiagnosticArray;
 using recording::kStart_ns;
 using recording::TemporaryFolder;
 using std::chrono::steady_clock;
@@ -35,6 +37,17 @@ bool logged(const FakeContext& fake, const std::string& text) {
     if (entry.text.find(text) != std::string::npos) return true;
   }
   return false;
+}
+
+void send_progress(FakeContext& fake,
+                   std::string_view component,
+                   std::int64_t stamp_ns,
+                   std::uint64_t frame_id) {
+  fake.send<Progress>("progress", [&](Progress& progress) {
+    progress.header().stamp_ns() = stamp_ns;
+    progress.header().frame_id() = frame_id;
+    component.copy(progress.component_name().data(), progress.component_name().size() - 1);
+  });
 }
 
 std::vector<config::Problem> change(FakeContext& fake,
@@ -81,6 +94,66 @@ TEST(ReplayComponent, LockstepSendsTheNextFrameWhenTheLastIsDone) {
     std::strncpy(progress.component_name().data(), "tracking", progress.component_name().size());
   });
   ASSERT_TRUE(run_until(fake, [&] { return logged(fake, "4 messages sent"); }));
+}
+
+/// Images in lockstep, one at a time, of which sync alone reports the first.
+class ReplayThatIsHeld : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    recording::write_bag(folder_.file("bag"), {{"/image", 0.0, 0}, {"/image", 0.1, 2}});
+    fake_.set_parameter("bag", folder_.file("bag"));
+    fake_.set_parameter("lockstep", true);
+    fake_.set_parameter("lockstep_topic", std::string("/image"));
+    fake_.set_parameter("lockstep_components", std::vector<std::string>{"sync", "tracking"});
+    fake_.set_parameter("frames_in_flight", std::int64_t{1});
+    fake_.set_parameter("exit_at_end", true);
+    replay_.emplace(fake_);
+    replay_->start();
+    ASSERT_TRUE(sent(fake_, "1"));
+    send_progress(fake_, "sync", kStart_ns, 1);
+  }
+  void tell_state(const std::string& component, const std::string& state) {
+    fake_.send<DiagnosticArray>("diagnostics", [&](DiagnosticArray& message) {
+      auto& status = message.status().emplace_back();
+      status.hardware_id("rig");
+      status.name("rig: " + component);
+      status.message("stopped after an error: bad frame");
+      status.values().emplace_back();
+      status.values().back().key("state");
+      status.values().back().value(state);
+    });
+  }
+
+  const TemporaryFolder folder_;
+  FakeContext fake_;
+  std::optional<ReplayComponent> replay_;
+};
+
+TEST_F(ReplayThatIsHeld, GivesUpWhenNothingMovesAndNamesWhoIsMissing) {
+  EXPECT_NO_THROW(fake_.advance(std::chrono::seconds(200))) << "a busy machine may take long";
+  send_progress(fake_, "viewer", kStart_ns, 1);
+  EXPECT_NO_THROW(fake_.advance(std::chrono::seconds(200))) << "somebody was still at work";
+  EXPECT_FALSE(fake_.exit_requested());
+  EXPECT_THAT([&] { fake_.advance(std::chrono::seconds(110)); },
+              ::testing::ThrowsMessage<std::runtime_error>(::testing::AllOf(
+                  ::testing::HasSubstr("tracking"), ::testing::Not(::testing::HasSubstr("sync")))));
+  EXPECT_TRUE(fake_.exit_requested());
+}
+
+TEST_F(ReplayThatIsHeld, MayBePausedForLong) {
+  ASSERT_TRUE(change(fake_, "paused", true).empty());
+  EXPECT_NO_THROW(fake_.advance(std::chrono::seconds(3600)));
+}
+
+TEST_F(ReplayThatIsHeld, DoesNotWaitForAComponentThatHasStopped) {
+  tell_state("viewer", "stopped");  // nobody waits for it
+  tell_state("tracking", "running");
+  EXPECT_NO_THROW(fake_.advance(std::chrono::seconds(10)));
+  tell_state("tracking", "stopped");
+  EXPECT_THAT([&] { fake_.advance(std::chrono::seconds(10)); },
+              ::testing::ThrowsMessage<std::runtime_error>(
+                  ::testing::HasSubstr("tracking (stopped after an error: bad frame)")));
+  EXPECT_TRUE(fake_.exit_requested());
 }
 
 TEST(ReplayComponent, ARecordingThatCannotBeReadToTheEndIsAnError) {
@@ -152,11 +225,7 @@ class ReplayToTheEnd : public ::testing::Test {
     ASSERT_TRUE(run_until(fake_, [&] { return logged(fake_, "2 messages sent"); }));
   }
   void report(std::string_view component, std::uint64_t frame_id) {
-    fake_.send<Progress>("progress", [&](Progress& progress) {
-      progress.header().stamp_ns() = kStart_ns + static_cast<std::int64_t>(frame_id);
-      progress.header().frame_id() = frame_id;
-      component.copy(progress.component_name().data(), progress.component_name().size() - 1);
-    });
+    send_progress(fake_, component, kStart_ns + static_cast<std::int64_t>(frame_id), frame_id);
   }
 
   const TemporaryFolder folder_;

@@ -8,6 +8,7 @@
 
 #include "camvox/component/component.hpp"
 #include "camvox/interfaces/camvox_interfaces.hpp"
+#include "camvox/interfaces/diagnostic_msgs.hpp"
 #include "camvox/interfaces/rosgraph_msgs.hpp"
 #include "camvox/recording/lockstep_gate.hpp"
 #include "camvox/recording/player.hpp"
@@ -66,7 +67,8 @@ struct ReplayConfig {
 
 /// Publishes a recording. Bytes go out as they were recorded, whatever their type; internal topics
 /// are decoded once, into loaned samples, by the container. With `lockstep` the next frame is sent
-/// when the named components have reported the earlier one on /camvox/progress.
+/// when the named components have reported the earlier one on /camvox/progress. When one of them
+/// has stopped, or none has reported anything for five minutes, the replay fails and names them.
 class ReplayComponent final : public Component {
  public:
   explicit ReplayComponent(Context& context);
@@ -87,13 +89,20 @@ class ReplayComponent final : public Component {
   void send(recording::PlayedMessage&& message);
   void play_when_connected();
   void add_progress(const camvox_interfaces::msg::Progress& progress);
+  void add_health(const diagnostic_msgs::msg::DiagnosticArray& health);
+  [[nodiscard]] bool any_stopped(const std::vector<std::string>& names) const;
+  [[nodiscard]] std::string with_reasons(std::vector<std::string> names) const;
   void report();
+  void check_lockstep(const recording::PlayerState& state);
   void report_end(const recording::PlayerState& state);
   void exit_when_done(const recording::PlayerState& state);
 
   Context& context_;
   ReplayConfig config_;
   recording::LockstepGate gate_;
+  std::map<std::string, std::string> stopped_;  // of those that lockstep waits for; why
+  std::uint64_t last_sent_ = 0;
+  int looks_held_ = 0;  // in a row at which lockstep held the next frame and nothing moved
   bool refusal_reported_ = false;
   Publisher<rosgraph_msgs::msg::Clock> clock_;
   std::vector<Publisher<RawMessage>> publishers_;  // by number of the bag's topic
