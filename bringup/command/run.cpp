@@ -117,7 +117,8 @@ void warn_of_default_calibration(const std::vector<ProbedComponent>& components,
     bool given = false;
     for (const auto& component : components) {
       for (const auto& [key, parameter] : component.effective_parameters) {
-        if (!key.starts_with(name + ".")) continue;
+        // Replay has but the time offset, and none is as good as any guess.
+        if (!key.starts_with(name + ".") || key == "rig.camera_time_offset_ns") continue;
         used = true;
         given = given || parameter.location.to_string() != "default";
       }

@@ -9,6 +9,7 @@ namespace camvox::bringup {
 namespace {
 
 constexpr auto kKey = "lockstep_components";
+constexpr auto kOffsetKey = "rig.camera_time_offset_ns";
 
 template <typename T>
 T value_of(const ProbedComponent& component, const std::string& key) {
@@ -40,6 +41,30 @@ std::string problem_with(const ProbedComponent& component, const std::string& pr
   return "does not report which frames are done, so that the replay would wait for ever";
 }
 
+/// Frames are reported in lidar time; the replay must know what lies between that and the stamps of
+/// the images.
+void check_offset(const ProbedComponent& replay,
+                  const std::vector<ProbedComponent>& components,
+                  std::vector<Problem>& problems) {
+  const auto own = replay.effective_parameters.find(kOffsetKey);
+  if (own == replay.effective_parameters.end()) return;
+  const auto offset_ns = value_of<std::int64_t>(replay, kOffsetKey);
+  for (const auto& component : components) {
+    if (!component.effective_parameters.contains(kOffsetKey)) continue;
+    const auto other_ns = value_of<std::int64_t>(component, kOffsetKey);
+    if (other_ns == offset_ns) continue;
+    const auto& other = component.effective_parameters.at(kOffsetKey);
+    const bool given = own->second.location.to_string() != "default";
+    problems.push_back({(given ? own->second : other).location,
+                        replay.name + ".parameters." + kOffsetKey,
+                        fmt::format("is {}, but {} in '{}'; give `rig` to all, under `parameters:` "
+                                    "of the file",
+                                    offset_ns,
+                                    other_ns,
+                                    component.name)});
+  }
+}
+
 }  // namespace
 
 std::vector<Problem> check_lockstep(const SystemConfig& config,
@@ -51,6 +76,7 @@ std::vector<Problem> check_lockstep(const SystemConfig& config,
   for (const auto& replay : components) {
     const auto* progress = find_port(replay, ProgressReporter::kFrames.name);
     if (progress == nullptr || !value_of<bool>(replay, "lockstep")) continue;
+    check_offset(replay, components, problems);
     for (const auto& name : value_of<std::vector<std::string>>(replay, kKey)) {
       const auto report = [&](const std::string& message) {
         problems.push_back({replay.effective_parameters.at(kKey).location,

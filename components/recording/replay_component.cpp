@@ -81,7 +81,8 @@ ReplayComponent::ReplayComponent(Context& context)
     : context_(context),
       config_(context.parameters<ReplayConfig>()),
       gate_(config_.lockstep ? config_.lockstep_components : std::vector<std::string>{},
-            static_cast<std::size_t>(config_.frames_in_flight)) {
+            static_cast<std::size_t>(config_.frames_in_flight)),
+      camera_time_offset_ns_(config_.camera_time_offset_ns) {
   if (config_.clock_hz > 0.0) {
     clock_ = context.advertise<rosgraph_msgs::msg::Clock>({"clock", topics::kClock},
                                                           {.qos = qos::kClock});
@@ -225,7 +226,7 @@ void ReplayComponent::advertise_topics(const storage::BagReader& bag) {
 
 void ReplayComponent::send(recording::PlayedMessage&& message) {
   const bool is_frame = is_frame_[message.topic];
-  const std::int64_t stamp_ns = header_stamp_ns(message.cdr);
+  const std::int64_t stamp_ns = header_stamp_ns(message.cdr) + camera_time_offset_ns_;
   if (is_frame) gate_.sent(stamp_ns);
   try {
     auto& publisher = publishers_[message.topic];

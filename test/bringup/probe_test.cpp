@@ -166,6 +166,21 @@ TEST(Probe, LockstepMayWaitForAnotherContainer) {
               IsEmpty());
 }
 
+/// Reports come in lidar time: the replay must know what lies between that and an image's stamp.
+TEST(Probe, LockstepNeedsTheTimeOffsetOfWhoReports) {
+  const std::string reporter =
+      "  - {plugin: test::FrameReporter, name: tracking,\n"
+      "     parameters: {rig: {camera_time_offset_ns: -30}}}\n";
+  EXPECT_THAT(
+      problems_of(reporter + lockstep_replay("[tracking]")),
+      ElementsAre(HasSubstr("replay.parameters.rig.camera_time_offset_ns: is 0, but -30 in "
+                            "'tracking'; give `rig` to all, under `parameters:` of the file")));
+  EXPECT_THAT(probe("parameters: {rig: {camera_time_offset_ns: -30}}\ncomponents:\n" + kReporters +
+                    lockstep_replay("[tracking]"))
+                  .problems,
+              IsEmpty());
+}
+
 TEST(Probe, WithoutLockstepNobodyIsWaitedFor) {
   EXPECT_THAT(problems_of(kReporters + "  - {plugin: test::LockstepReplay, name: replay,\n"
                                        "     parameters: {lockstep_components: [loop_closing]}}\n"),

@@ -71,10 +71,12 @@ class ThrowingInt : public camvox::Component {
 
 struct ReporterConfig {
   bool fail = false;
+  std::int64_t camera_time_offset_ns = 0;
 
   template <typename Self, typename Visitor>
   static void visit(Self& self, Visitor&& field) {
     field("fail", self.fail);
+    field("rig.camera_time_offset_ns", self.camera_time_offset_ns);
   }
 };
 
@@ -103,11 +105,13 @@ class KeyframeReporter : public camvox::Component {
 struct LockstepConfig {
   bool lockstep = false;
   std::vector<std::string> lockstep_components;
+  std::int64_t camera_time_offset_ns = 0;
 
   template <typename Self, typename Visitor>
   static void visit(Self& self, Visitor&& field) {
     field("lockstep", self.lockstep);
     field("lockstep_components", self.lockstep_components);
+    field("rig.camera_time_offset_ns", self.camera_time_offset_ns);
   }
 };
 

@@ -96,6 +96,40 @@ TEST(ReplayComponent, LockstepSendsTheNextFrameWhenTheLastIsDone) {
   ASSERT_TRUE(run_until(fake, [&] { return logged(fake, "4 messages sent"); }));
 }
 
+/// Sync stamps its reports in lidar time: 10 ms after these images by the driver, whose clock is 30
+/// ms behind or 500 ms ahead.
+class ReplayWithAnOffset : public ::testing::TestWithParam<std::int64_t> {};
+
+TEST_P(ReplayWithAnOffset, LockstepFollowsReportsInLidarTime) {
+  const TemporaryFolder folder;
+  recording::write_bag(folder.file("bag"),
+                       {{"/image", 0.0, 0}, {"/image", 0.1, 1}, {"/image", 0.2, 2}});
+  FakeContext fake;
+  fake.set_parameter("bag", folder.file("bag"));
+  fake.set_parameter("lockstep", true);
+  fake.set_parameter("lockstep_topic", std::string("/image"));
+  fake.set_parameter("lockstep_components", std::vector<std::string>{"sync", "tracking"});
+  fake.set_parameter("frames_in_flight", std::int64_t{1});
+  fake.set_parameter("rig.camera_time_offset_ns", GetParam());
+  ReplayComponent replay(fake);
+  replay.start();
+  ASSERT_TRUE(sent(fake, "1"));
+  const std::int64_t half_readout_ns = 10'000'000;
+  for (const std::int64_t number : {0, 1}) {
+    const auto stamp_ns = kStart_ns + number * 100'000'000 + GetParam() + half_readout_ns;
+    send_progress(fake, "sync", stamp_ns, 1 + number);
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    fake.advance(std::chrono::milliseconds(200));
+    EXPECT_EQ(fake.diagnostics().status().values["sent"], std::to_string(1 + number));
+    send_progress(fake, "tracking", stamp_ns, 1 + number);
+    ASSERT_TRUE(sent(fake, std::to_string(2 + number)));
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Clocks,
+                         ReplayWithAnOffset,
+                         ::testing::Values(-30'000'000, 0, 500'000'000));
+
 /// Images in lockstep, one at a time, of which sync alone reports the first.
 class ReplayThatIsHeld : public ::testing::Test {
  protected:

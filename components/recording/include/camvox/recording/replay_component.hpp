@@ -33,6 +33,8 @@ struct ReplayConfig {
   std::string lockstep_topic = "/camera/image_raw";  ///< Or compressed: the frames.
   std::vector<std::string> lockstep_components;      ///< Who reports each frame done.
   int frames_in_flight = 2;  ///< Frames sent before the first of them must be done.
+  /// What sync adds to an image's stamp: it reports frames in lidar time. For lockstep.
+  std::int64_t camera_time_offset_ns = 0;
   /// Starts when each of these topics has a publisher and a subscriber, one of them in another
   /// process: a back end that is not there yet would miss the first frames.
   std::vector<std::string> wait_for_topics;
@@ -59,6 +61,7 @@ struct ReplayConfig {
     field("lockstep_topic", self.lockstep_topic);
     field("lockstep_components", self.lockstep_components);
     field("frames_in_flight", self.frames_in_flight, config::at_least(1));
+    field("rig.camera_time_offset_ns", self.camera_time_offset_ns);
     field("wait_for_topics", self.wait_for_topics);
     field("exit_at_end", self.exit_at_end);
     field("settle_s", self.settle_s, config::at_least(0.0), config::at_most(3600.0));
@@ -100,6 +103,7 @@ class ReplayComponent final : public Component {
   Context& context_;
   ReplayConfig config_;
   recording::LockstepGate gate_;
+  std::int64_t camera_time_offset_ns_;          // as config_, which the player's thread may not see
   std::map<std::string, std::string> stopped_;  // of those that lockstep waits for; why
   std::uint64_t last_sent_ = 0;
   int looks_held_ = 0;  // in a row at which lockstep held the next frame and nothing moved
