@@ -49,7 +49,10 @@ std::vector<TopicEndpoints> topics_of(const std::vector<DiscoveredEndpoint>& end
     const std::string name = endpoint.topic_name.substr(kRosPrefix.size() - 1);
     auto& topic = topics[name];
     topic.name = name;
-    topic.type_name = interfaces::to_ros_type_name(endpoint.type_name);
+    // What is sent counts: a reader of another type gets nothing of it.
+    if (endpoint.is_writer || topic.publishers.empty()) {
+      topic.type_name = interfaces::to_ros_type_name(endpoint.type_name);
+    }
     (endpoint.is_writer ? topic.publishers : topic.subscribers).push_back(endpoint);
   }
   std::vector<TopicEndpoints> sorted;

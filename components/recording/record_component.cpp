@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <optional>
 #include <stdexcept>
 
 #include "qos_overrides.hpp"
@@ -84,7 +85,12 @@ void RecordComponent::follow_topics() {
     if (topic.publishers == 0 || subscriptions_.contains(topic.name) || !wanted(topic.name)) {
       continue;
     }
-    record(topic);
+    try {
+      record(topic);
+    } catch (const std::exception& error) {  // others may publish what they like by this name
+      context_.log().error("{}: not recorded: {}", topic.name, error.what());
+      subscriptions_[topic.name] = nullptr;  // told once
+    }
   }
 }
 
@@ -105,6 +111,26 @@ Qos RecordComponent::qos_of(const TopicDescription& topic) {
 }
 
 void RecordComponent::record(const TopicDescription& topic) {
+  // Subscribes first: if that is refused, the recording shall not list the topic.
+  const auto number = std::make_shared<std::optional<std::size_t>>();
+  const SubscribeOptions options{.qos = qos_of(topic), .required = false};
+  subscriptions_[topic.name] = context_.subscribe_raw(
+      {topic.name, topic.name},
+      topic.type_name,
+      [this, number](const Sample<RawMessage>& sample) {
+        if (!*number) return;
+        const auto bytes =
+            std::shared_ptr<const std::vector<std::uint8_t>>(sample.message(), &sample->cdr);
+        recorder_->write(**number, context_.now_ns(), sample.info().publish_stamp_ns, bytes);
+      },
+      options);
+  const auto added = recorder_->add_topic(bag_topic(topic));
+  if (!added.ok()) throw std::runtime_error(added.status().message());
+  *number = *added;
+  context_.log().info("recording {} ({})", topic.name, topic.type_name);
+}
+
+storage::BagTopic RecordComponent::bag_topic(const TopicDescription& topic) {
   const MessageType* type = interfaces::find_message_type(topic.type_name);
   storage::BagTopic entry;
   entry.name = topic.name;
@@ -120,23 +146,7 @@ void RecordComponent::record(const TopicDescription& topic) {
         topic.name,
         topic.type_name);
   }
-  const auto number = recorder_->add_topic(std::move(entry));
-  if (!number.ok()) {
-    context_.log().error("{}: {}", topic.name, number.status().message());
-    subscriptions_[topic.name] = nullptr;  // told once
-    return;
-  }
-  const SubscribeOptions options{.qos = qos_of(topic), .required = false};
-  subscriptions_[topic.name] = context_.subscribe_raw(
-      {topic.name, topic.name},
-      topic.type_name,
-      [this, topic_number = *number](const Sample<RawMessage>& sample) {
-        const auto bytes =
-            std::shared_ptr<const std::vector<std::uint8_t>>(sample.message(), &sample->cdr);
-        recorder_->write(topic_number, context_.now_ns(), sample.info().publish_stamp_ns, bytes);
-      },
-      options);
-  context_.log().info("recording {} ({})", topic.name, topic.type_name);
+  return entry;
 }
 
 void RecordComponent::report() {

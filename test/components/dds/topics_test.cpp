@@ -29,6 +29,15 @@ TEST(Topics, AreSortedByNameWithWhoPublishesAndReadsThem) {
   EXPECT_TRUE(topics_of({}).empty());
 }
 
+TEST(Topics, HaveTheTypeOfTheirPublishers) {
+  auto reader = endpoint("rt/tf", false, true, false);
+  reader.type_name = "std_msgs::msg::dds_::Header_";
+  const auto writer = endpoint("rt/tf", true, true, false);
+  EXPECT_EQ(topics_of({reader, writer}).at(0).type_name, "tf2_msgs/msg/TFMessage");
+  EXPECT_EQ(topics_of({writer, reader}).at(0).type_name, "tf2_msgs/msg/TFMessage");
+  EXPECT_EQ(topics_of({reader}).at(0).type_name, "std_msgs/msg/Header");
+}
+
 /// DDS matches no reader that asks for more than a writer offers: one that reads what is offered
 /// must get the messages of each publisher.
 TEST(Topics, OfferWhatAllTheirPublishersOffer) {

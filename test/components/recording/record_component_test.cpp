@@ -2,10 +2,12 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <fstream>
 
 #include "bag_files.hpp"
 #include "camvox/component/fake_context.hpp"
+#include "camvox/interfaces/std_msgs.hpp"
 
 namespace camvox {
 namespace {
@@ -49,6 +51,33 @@ TEST(RecordComponent, RecordsEveryTopicWithItsDefinition) {
   }
   EXPECT_THAT(contents, ::testing::ElementsAre(1, 2, 3));
   EXPECT_THAT(fake.log_entries().at(2).text, ::testing::HasSubstr("x_msgs/msg/Unknown"));
+}
+
+/// A publisher elsewhere may call anything by the name of a topic that this process has already.
+TEST(RecordComponent, ATopicThatCannotBeReadCostsOnlyItself) {
+  const TemporaryFolder folder;
+  FakeContext fake;
+  fake.set_parameter("output", folder.file("out"));
+  fake.subscribe<std_msgs::msg::Header>({"/clash", "/clash"}, [](const auto&) {});
+  fake.set_topics({topic("/clash", "sensor_msgs/msg/Imu"), topic("/good", "std_msgs/msg/Header")});
+  {
+    RecordComponent record(fake);
+    ASSERT_NO_THROW(record.start());
+    fake.send("/good", message(1));
+    EXPECT_NO_THROW(fake.advance(std::chrono::seconds(2)));
+  }
+  const auto bag = recording::open_bag(folder.file("out"));
+  ASSERT_EQ(bag->topics().size(), 1U);
+  EXPECT_EQ(bag->topics()[0].name, "/good");
+  EXPECT_EQ(bag->message_count(), 1U);
+  const auto entries = fake.log_entries();
+  EXPECT_EQ(std::count_if(entries.begin(),
+                          entries.end(),
+                          [](const auto& entry) {
+                            return entry.level == LogLevel::kError &&
+                                   entry.text.starts_with("/clash: not recorded");
+                          }),
+            1);
 }
 
 TEST(RecordComponent, LeavesOutWhatIsExcludedOrNotAskedFor) {

@@ -60,6 +60,7 @@ class RecordComponent final : public Component {
  private:
   void follow_topics();
   void record(const TopicDescription& topic);
+  [[nodiscard]] storage::BagTopic bag_topic(const TopicDescription& topic);
   void report();
   [[nodiscard]] bool wanted(const std::string& topic) const;
   [[nodiscard]] Qos qos_of(const TopicDescription& topic);
