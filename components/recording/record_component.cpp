@@ -49,6 +49,10 @@ RecordComponent::~RecordComponent() {
   if (!status.ok()) context_.log().error("{}", status.message());
 }
 
+void RecordComponent::stop() {
+  if (const auto status = finish(); !status.ok()) throw std::runtime_error(status.message());
+}
+
 storage::Status RecordComponent::finish() {
   if (!recorder_) return {};
   return recorder_->close();

@@ -1,8 +1,10 @@
 #include "camvox/recording/record_component.hpp"
 
 #include <gmock/gmock.h>
+#include <sys/resource.h>
 
 #include <algorithm>
+#include <csignal>
 #include <fstream>
 
 #include "bag_files.hpp"
@@ -78,6 +80,51 @@ TEST(RecordComponent, ATopicThatCannotBeReadCostsOnlyItself) {
                                    entry.text.starts_with("/clash: not recorded");
                           }),
             1);
+}
+
+/// Lets no file of this process grow beyond a size, as a full disk would.
+class FileSizeLimit {
+ public:
+  explicit FileSizeLimit(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
+    getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit limit{bytes, before_.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &limit);
+  }
+  FileSizeLimit(const FileSizeLimit&) = delete;
+  FileSizeLimit& operator=(const FileSizeLimit&) = delete;
+  ~FileSizeLimit() {
+    setrlimit(RLIMIT_FSIZE, &before_);
+    std::signal(SIGXFSZ, handler_);
+  }
+
+ private:
+  rlimit before_{};
+  void (*handler_)(int);
+};
+
+TEST(RecordComponent, AFullDiskIsToldWhenItStops) {
+  const TemporaryFolder folder;
+  FakeContext fake;
+  fake.set_parameter("output", folder.file("out"));
+  fake.set_topics({topic("/imu", "sensor_msgs/msg/Imu")});
+  const FileSizeLimit limit(10'000);
+  RecordComponent record(fake);
+  record.start();
+  fake.send("/imu", RawMessage{std::vector<std::uint8_t>(20'000)});
+  EXPECT_THAT([&] { record.stop(); },
+              ::testing::ThrowsMessage<std::runtime_error>(::testing::HasSubstr("out_0.mcap")));
+}
+
+TEST(RecordComponent, StopsWithoutAnErrorWhenAllIsSaved) {
+  const TemporaryFolder folder;
+  FakeContext fake;
+  fake.set_parameter("output", folder.file("out"));
+  fake.set_topics({topic("/imu", "sensor_msgs/msg/Imu")});
+  RecordComponent record(fake);
+  record.start();
+  fake.send("/imu", message(1));
+  EXPECT_NO_THROW(record.stop());
+  EXPECT_EQ(recording::open_bag(folder.file("out"))->message_count(), 1U);
 }
 
 TEST(RecordComponent, LeavesOutWhatIsExcludedOrNotAskedFor) {

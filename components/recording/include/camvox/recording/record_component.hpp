@@ -51,6 +51,8 @@ class RecordComponent final : public Component {
   explicit RecordComponent(Context& context);
   ~RecordComponent() override;
   void start() override;
+  /// Throws if not all that came could be saved; a run then ends with exit code 3.
+  void stop() override;
   /// Writes what waits and closes the recording; tells what came of it.
   storage::Status finish();
   [[nodiscard]] recording::RecorderState state() const { return recorder_->state(); }
