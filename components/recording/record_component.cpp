@@ -50,7 +50,9 @@ RecordComponent::~RecordComponent() {
 }
 
 void RecordComponent::stop() {
-  if (const auto status = finish(); !status.ok()) throw std::runtime_error(status.message());
+  const auto status = finish();
+  recorder_.reset();  // the destructor has nothing to tell any more
+  if (!status.ok()) throw std::runtime_error(status.message());
 }
 
 storage::Status RecordComponent::finish() {

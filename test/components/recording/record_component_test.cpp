@@ -108,11 +108,16 @@ TEST(RecordComponent, AFullDiskIsToldWhenItStops) {
   fake.set_parameter("output", folder.file("out"));
   fake.set_topics({topic("/imu", "sensor_msgs/msg/Imu")});
   const FileSizeLimit limit(10'000);
-  RecordComponent record(fake);
-  record.start();
-  fake.send("/imu", RawMessage{std::vector<std::uint8_t>(20'000)});
-  EXPECT_THAT([&] { record.stop(); },
-              ::testing::ThrowsMessage<std::runtime_error>(::testing::HasSubstr("out_0.mcap")));
+  {
+    RecordComponent record(fake);
+    record.start();
+    fake.send("/imu", RawMessage{std::vector<std::uint8_t>(20'000)});
+    EXPECT_THAT([&] { record.stop(); },
+                ::testing::ThrowsMessage<std::runtime_error>(::testing::HasSubstr("out_0.mcap")));
+  }
+  for (const auto& entry : fake.log_entries()) {
+    EXPECT_NE(entry.level, LogLevel::kError) << "told once: " << entry.text;
+  }
 }
 
 TEST(RecordComponent, StopsWithoutAnErrorWhenAllIsSaved) {
