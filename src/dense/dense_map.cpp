@@ -53,7 +53,7 @@ std::size_t DenseMap::add_keyframe(std::uint64_t id,
     throw std::logic_error("DenseMap: the depth image is not of the camera's size");
   }
   if (blocks_.contains(id)) return 0;
-  if (voxels_stale_) refill_voxels();
+  if (voxels_stale_ || voxels_.size() > most_voxels()) refill_voxels();
   Block block{T_map_camera, config_.voxel_size_m, {}};
   const Eigen::Matrix3f R_map_camera = T_map_camera.rotation().matrix().cast<float>();
   const Eigen::Vector3f t_map_camera = T_map_camera.translation().cast<float>();
@@ -114,6 +114,12 @@ void DenseMap::refill_voxels() {
   voxels_.clear();
   for (const auto& point : points()) voxels_.insert(voxel_key(point.p, config_.voxel_size_m));
   voxels_stale_ = false;
+}
+
+/// Thinning leaves the voxels of the points that it takes. Half of them may be such: a refill
+/// visits every point, and comes only once as many points were added as the map holds.
+std::size_t DenseMap::most_voxels() const {
+  return 2 * std::max(size_, static_cast<std::size_t>(config_.max_points));
 }
 
 void DenseMap::bound_memory() {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <limits>
 #include <set>
 
@@ -108,6 +109,23 @@ TEST(DenseMap, MemoryIsBoundedByThinningTheOldest) {
   }
   EXPECT_GT(oldest, 0U);
   EXPECT_GT(newest, oldest);
+}
+
+TEST(DenseMap, VoxelsAreBoundedAsThePointsAre) {
+  constexpr std::size_t kLimit = 15000;
+  auto map = make_map({.stride_px = 1, .max_points = kLimit});
+  const Wall wall(5.0F);
+  std::size_t most = 0;
+  std::size_t added = 0;
+  for (int i = 0; i < 200; ++i) {
+    added +=
+        map.add_keyframe(static_cast<std::uint64_t>(i), at(10.0 * i), wall.depth(), wall.image());
+    most = std::max(most, map.voxel_count());
+  }
+  ASSERT_GT(added, 30 * kLimit);
+  // Tidied up when a keyframe begins, so one keyframe of 64 x 48 pixels may go over.
+  EXPECT_LE(most, 2 * kLimit + 64 * 48);
+  EXPECT_GE(map.voxel_count(), map.size()) << "what is there stays occupied";
 }
 
 TEST(DenseMap, LeavesOutWhatIsNoGoodDepth) {

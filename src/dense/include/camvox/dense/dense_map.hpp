@@ -21,7 +21,7 @@ struct DenseMapConfig {
   double max_depth_m = 50.0;            ///< Farther pixels are left out: they are few and blurred.
   double max_sigma_m = 0.25;            ///< Depths less certain than this are left out.
   int stride_px = 2;                    ///< Every how many columns and rows a pixel is taken.
-  std::int64_t max_points = 4'000'000;  ///< Bound of memory, 16 bytes each; old parts are thinned.
+  std::int64_t max_points = 4'000'000;  ///< Bound of memory, 100 bytes each; old parts are thinned.
 
   template <typename Self, typename Visitor>
   static void visit(Self& self, Visitor&& field) {
@@ -74,6 +74,8 @@ class DenseMap {
   void remove_keyframe(std::uint64_t id);
 
   [[nodiscard]] std::size_t size() const { return size_; }
+  /// Voxels that count as occupied: those of the points, and for a while those of thinned ones.
+  [[nodiscard]] std::size_t voxel_count() const { return voxels_.size(); }
   /// All points, in the map frame.
   [[nodiscard]] std::vector<ColouredPoint> points() const;
   /// Where the keyframes are, in the map frame.
@@ -88,6 +90,7 @@ class DenseMap {
 
   void note_motion(const geometry::SE3& T_before, const geometry::SE3& T_after);
   void refill_voxels();
+  [[nodiscard]] std::size_t most_voxels() const;
   void bound_memory();
   void thin(Block& block);
 
