@@ -15,8 +15,12 @@ constexpr std::size_t kBlock = 256;
 constexpr std::size_t kTableSize = 8192;
 /// Nearer to the camera's plane a point has no pixel.
 constexpr float kMinDepth_m = 0.05F;
+/// The squared tangent of 85 degrees. The table has equal steps of it, which at 90 degrees would be
+/// without bound; up to here they are fine enough for the 0.01 px.
+constexpr double kMaxRadius2 = 130.6;
 
-/// The largest squared radius of a direction whose pixel is in the image or within the margin.
+/// The largest squared radius of a direction whose pixel is in the image or within the margin;
+/// kMaxRadius2 where the border lies beyond what the lens shows.
 double largest_radius2(const sensors::CameraModel& camera, double margin_px) {
   const auto& intrinsics = camera.intrinsics();
   double largest = 0.0;
@@ -25,9 +29,9 @@ double largest_radius2(const sensors::CameraModel& camera, double margin_px) {
   const double height = intrinsics.height_px + 2.0 * margin_px;
   const auto look = [&](double across, double along) {
     const auto view = camera.unproject({across * width - margin_px, along * height - margin_px});
-    if (!view.converged) return;
     const Eigen::Vector3d& f = view.f_camera;
-    largest = std::max(largest, f.head<2>().squaredNorm() / (f.z() * f.z()));
+    const double radius2 = f.head<2>().squaredNorm() / (f.z() * f.z());
+    largest = std::max(largest, view.converged ? radius2 : kMaxRadius2);
   };
   for (int i = 0; i <= kSteps; ++i) {
     for (const double side : {0.0, 1.0}) {
@@ -77,7 +81,7 @@ PointProjection::PointProjection(const sensors::CameraModel& camera,
     p2_ = static_cast<float>(std::exchange(coefficients[3], 0.0));
   }
   const sensors::Distortion radial(intrinsics.distortion_model, coefficients);
-  double limit = 1.02 * largest_radius2(camera, bounds.margin_px);
+  double limit = std::min(1.02 * largest_radius2(camera, bounds.margin_px), kMaxRadius2);
   const sensors::Distortion whole(intrinsics.distortion_model, intrinsics.distortion);
   limit = std::min(limit, whole.max_radius() * whole.max_radius());
   max_radius2_ = static_cast<float>(limit);

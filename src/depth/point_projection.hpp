@@ -33,7 +33,7 @@ struct ProjectionBounds {
 };
 
 /// CameraModel::project for many points: single precision, the radial part of the lens model from a
-/// table. Agrees with it to 0.01 px.
+/// table. Agrees with it to 0.01 px. What is more than 85 degrees off the axis is left out.
 class PointProjection {
  public:
   PointProjection(const sensors::CameraModel& camera, const ProjectionBounds& bounds);
