@@ -74,8 +74,9 @@ void CalibrationComponent::keep(std::map<std::uint64_t, Sample<Message>>& frames
 bool CalibrationComponent::wanted(std::int64_t stamp_ns) const {
   if (done_here_ || job_.busy()) return false;
   if (requested_) return true;
-  const auto interval_ns = static_cast<std::int64_t>(1e9 * config_.min_interval_s);
-  return config_.automatic && (!last_run_ns_ || stamp_ns - *last_run_ns_ >= interval_ns);
+  if (!config_.automatic) return false;
+  if (!last_run_ns_ || stamp_ns < *last_run_ns_) return true;  // before it: the clock was set back
+  return stamp_ns - *last_run_ns_ >= static_cast<std::int64_t>(1e9 * config_.min_interval_s);
 }
 
 void CalibrationComponent::add(const FrameImage& image, const Cloud& cloud) {

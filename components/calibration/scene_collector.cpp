@@ -13,6 +13,7 @@ constexpr std::size_t kMaxPoints = 2'000'000;
 
 void SceneCollector::add(const camvox_interfaces::msg::FrameImage& image,
                          const camvox_interfaces::msg::Cloud& cloud) {
+  if (first_ns_ && cloud.header().stamp_ns() < *first_ns_) clear();  // the clock was set back
   last_ns_ = cloud.header().stamp_ns();
   if (!first_ns_) first_ns_ = last_ns_;
   if (scene_.image.empty() && conversion::is_well_formed(image))

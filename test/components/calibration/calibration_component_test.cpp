@@ -85,11 +85,21 @@ class CalibrationComponentTest : public ::testing::Test {
       message.data_count(static_cast<std::uint32_t>(bytes));
     });
   }
-  void stand_still() {
-    send_image(0);
-    send_cloud(0, true, true);
-    send_cloud(kSecond_ns, true, false);  // the two of a frame come in any order
-    send_image(kSecond_ns);
+  void stand_still(std::int64_t from_ns = 0) {
+    send_image(from_ns);
+    send_cloud(from_ns, true, true);
+    send_cloud(from_ns + kSecond_ns, true, false);  // the two of a frame come in any order
+    send_image(from_ns + kSecond_ns);
+  }
+  void move(std::int64_t stamp_ns) {
+    send_cloud(stamp_ns, false, false);
+    send_image(stamp_ns);
+  }
+  /// Calibrations that ran at this standstill. With a camera that does not fit the image each says
+  /// so at once: when they run does not depend on how they end.
+  std::size_t runs_at(std::int64_t stamp_ns, bool expected) {
+    stand_still(stamp_ns);
+    return fake_.run_posted(expected ? std::chrono::seconds(60) : std::chrono::seconds(0));
   }
 
   FakeContext fake_{"calibration"};
@@ -162,6 +172,25 @@ TEST_F(CalibrationComponentTest, WaitsForStandstillAndForItsInterval) {
   stand_still();
   EXPECT_EQ(fake_.run_posted(), 0U);
   EXPECT_TRUE(fake_.published<Extrinsics>("extrinsics").empty());
+}
+
+TEST_F(CalibrationComponentTest, TheNextStandstillHasItsTurnAfterTheInterval) {
+  fake_.set_parameter("camera.width_px", std::int64_t{800});
+  fake_.set_parameter("min_interval_s", 60.0);
+  CalibrationComponent component(fake_);
+  EXPECT_EQ(runs_at(100 * kSecond_ns, true), 1U);
+  move(110 * kSecond_ns);
+  EXPECT_EQ(runs_at(159 * kSecond_ns, false), 0U) << "59 s";
+  move(165 * kSecond_ns);
+  EXPECT_EQ(runs_at(170 * kSecond_ns, true), 1U);
+}
+
+TEST_F(CalibrationComponentTest, AClockThatWasSetBackDoesNotStopIt) {
+  fake_.set_parameter("camera.width_px", std::int64_t{800});
+  CalibrationComponent component(fake_);
+  EXPECT_EQ(runs_at(1000 * kSecond_ns, true), 1U);
+  move(1010 * kSecond_ns);
+  EXPECT_EQ(runs_at(5 * kSecond_ns, true), 1U);
 }
 
 TEST_F(CalibrationComponentTest, NamesWhatIsWrong) {

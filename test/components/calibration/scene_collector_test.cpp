@@ -61,5 +61,18 @@ TEST(SceneCollector, WaitsForAnImageThatCanBeUsed) {
   EXPECT_TRUE(collector.take().points_lidar.empty());
 }
 
+TEST(SceneCollector, BeginsAnewWhenTheClockIsSetBack) {
+  SceneCollector collector;
+  collector.add(*image(10), *cloud(100.0, 2));
+  collector.add(*image(20), *cloud(101.0, 2));
+  collector.add(*image(30), *cloud(5.0, 3));
+  EXPECT_FALSE(collector.is_complete(1.0));
+  collector.add(*image(40), *cloud(6.0, 4));
+  EXPECT_TRUE(collector.is_complete(1.0));
+  const auto scene = collector.take();
+  EXPECT_EQ(scene.points_lidar.size(), 7U);
+  EXPECT_EQ(scene.image.at<cv::Vec3b>(0, 0)[0], 30) << "nothing from before";
+}
+
 }  // namespace
 }  // namespace camvox::calibration_component

@@ -12,7 +12,7 @@ namespace camvox::calibration_component {
 /// all clouds (lidar frame, m), as many as memory allows.
 class SceneCollector {
  public:
-  /// Image and cloud of one frame.
+  /// Image and cloud of one frame. One from before the first begins anew: the clock was set back.
   void add(const camvox_interfaces::msg::FrameImage& image,
            const camvox_interfaces::msg::Cloud& cloud);
   void clear() { *this = {}; }
