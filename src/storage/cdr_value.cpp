@@ -264,7 +264,8 @@ std::optional<std::int64_t> header_stamp_ns(const CdrValue& message) {
     const auto seconds = sec->as_integer();
     const auto nanoseconds = nanosec->as_integer();
     // As in the definition, 32 bits each, so that the product cannot overflow.
-    if (seconds && nanoseconds && std::abs(*seconds) <= INT32_MAX && *nanoseconds <= UINT32_MAX) {
+    if (seconds && nanoseconds && *seconds >= INT32_MIN && *seconds <= INT32_MAX &&
+        *nanoseconds >= 0 && *nanoseconds <= UINT32_MAX) {
       return *seconds * 1'000'000'000 + *nanoseconds;
     }
   }

@@ -184,6 +184,21 @@ TEST(CdrValue, ForgedCountsDoNotTakeMemory) {
             StatusCode::kUnsupported);
 }
 
+TEST(CdrValue, ForgedStampsAreNone) {
+  const auto schema =
+      schema_of("p/msg/T", "S stamp\n" + dependency("p/S", "int64 sec\nint64 nanosec"));
+  const auto stamp_ns = [&](std::int64_t sec, std::int64_t nanosec) {
+    const auto message = decode_cdr(schema, Cdr().number(sec).number(nanosec).bytes());
+    return message.ok() ? header_stamp_ns(*message) : -1;
+  };
+  constexpr auto kLeast = std::numeric_limits<std::int64_t>::min();
+  EXPECT_EQ(stamp_ns(-2, 5), -1'999'999'995);
+  EXPECT_EQ(stamp_ns(INT32_MIN, 0), std::int64_t{INT32_MIN} * 1'000'000'000);
+  EXPECT_EQ(stamp_ns(kLeast, 0), std::nullopt);
+  EXPECT_EQ(stamp_ns(std::int64_t{INT32_MAX} + 1, 0), std::nullopt);
+  EXPECT_EQ(stamp_ns(-1, kLeast), std::nullopt);
+}
+
 TEST(CdrValue, NoiseIsSurvived) {
   std::mt19937 random(3);
   const auto schema = schema_of("tf2_msgs/msg/TFMessage", kTfMessage);
