@@ -28,7 +28,7 @@ DepthComponent::DepthComponent(Context& context)
     : context_(context),
       config_(context.parameters<DepthComponentConfig>()),
       projector_(sensors::CameraModel(config_.camera), config_.projector),
-      T_camera_lidar_(sensors::make_rig_calibration(config_.rig).T_camera_lidar()),
+      extrinsics_(sensors::make_rig_calibration(config_.rig).T_camera_lidar()),
       accumulator_(config_.accumulate_scans, config_.rig),
       progress_(context),
       depth_images_(context.advertise<DepthImage>({"depth_image", topics::kDepthImage},
@@ -54,15 +54,13 @@ DepthComponent::DepthComponent(Context& context)
 }
 
 void DepthComponent::on_extrinsics(const Extrinsics& extrinsics) {
-  if (extrinsics.applied() == 0 || extrinsics.version() <= extrinsics_version_) return;
-  T_camera_lidar_ = conversion::to_se3(extrinsics.T_camera_lidar());
-  extrinsics_version_ = extrinsics.version();
+  if (!extrinsics_.take(extrinsics)) return;
   const auto [rotation_rad, translation_m] =
       sigmas_of(conversion::to_matrix(extrinsics.covariance_lidar()));
   if (std::isfinite(rotation_rad) && std::isfinite(translation_m)) {
     projector_.set_extrinsics_sigma(rotation_rad, translation_m);
   }
-  context_.log().info("extrinsics version {} from now on", extrinsics_version_);
+  context_.log().info("extrinsics version {} from now on", extrinsics_.version());
 }
 
 void DepthComponent::on_cloud(const Sample<Cloud>& cloud) {
@@ -96,12 +94,12 @@ void DepthComponent::process_waiting() {
 void DepthComponent::process(const Cloud& cloud) {
   auto depth = depth_images_.loan();
   depth->header() = cloud.header();
-  depth->extrinsics_version(extrinsics_version_);
+  depth->extrinsics_version(extrinsics_.version());
   depth->width_px(static_cast<std::uint32_t>(config_.camera.width_px));
   depth->height_px(static_cast<std::uint32_t>(config_.camera.height_px));
   if (cloud.points_count() > 0) {
     const std::size_t pixels = std::size_t{depth->width_px()} * depth->height_px();
-    const auto report = projector_.project(accumulator_.add(cloud, T_camera_lidar_),
+    const auto report = projector_.project(accumulator_.add(cloud, extrinsics_.T_camera_lidar()),
                                            {depth->depth_m().data(), pixels},
                                            {depth->sigma_m().data(), pixels});
     depth->depth_m_count(static_cast<std::uint32_t>(pixels));
@@ -111,7 +109,7 @@ void DepthComponent::process(const Cloud& cloud) {
     context_.diagnostics().set("pixels with depth", report.filled_px);
   }
   publish_edge_topics(*depth);
-  coloured_cloud_.add(cloud, *depth, T_camera_lidar_);
+  coloured_cloud_.add(cloud, *depth, extrinsics_.T_camera_lidar());
   depth_images_.publish(std::move(depth));
   progress_.done(cloud.header());
 }

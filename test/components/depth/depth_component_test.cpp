@@ -73,6 +73,27 @@ class DepthTest : public testing::Test {
     });
   }
 
+  struct Calibrated {
+    std::uint64_t version;
+    std::uint8_t applied;
+    double forward_m;  ///< Of the lidar, so that the wall is as much farther from the camera.
+    std::int64_t stamp_ns = 0;
+  };
+  void send_extrinsics(const Calibrated& calibrated) {
+    Extrinsics extrinsics;
+    extrinsics.version(calibrated.version);
+    extrinsics.applied(calibrated.applied);
+    extrinsics.header().stamp_ns(calibrated.stamp_ns);
+    const geometry::SO3 R_camera_lidar(Eigen::Quaterniond(-0.5, 0.5, -0.5, 0.5).conjugate());
+    extrinsics.T_camera_lidar(
+        conversion::to_array(geometry::SE3(R_camera_lidar, {0.0, 0.0, calibrated.forward_m})));
+    fake_.send("extrinsics", extrinsics);
+  }
+  std::shared_ptr<const DepthImage> depth_now() {
+    send_wall(1, 10.0F);
+    return fake_.published<DepthImage>("depth_image").back();
+  }
+
   static float centre_m(const DepthImage& depth) {
     return depth.depth_m()[kWidth * (kHeight / 2) + kWidth / 2];
   }
@@ -113,17 +134,7 @@ TEST_F(DepthTest, ACloudWithoutPointsGivesAnEmptyImage) {
 TEST_F(DepthTest, OnlyExtrinsicsThatPassedTakeEffectAndOnlyNewerOnes) {
   DepthComponent component(fake_);
   const auto send = [&](std::uint64_t version, std::uint8_t applied, double forward_m) {
-    Extrinsics extrinsics;
-    extrinsics.version(version);
-    extrinsics.applied(applied);
-    const geometry::SO3 R_camera_lidar(Eigen::Quaterniond(-0.5, 0.5, -0.5, 0.5).conjugate());
-    extrinsics.T_camera_lidar(
-        conversion::to_array(geometry::SE3(R_camera_lidar, {0.0, 0.0, forward_m})));
-    fake_.send("extrinsics", extrinsics);
-  };
-  const auto depth_now = [&] {
-    send_wall(1, 10.0F);
-    return fake_.published<DepthImage>("depth_image").back();
+    send_extrinsics({.version = version, .applied = applied, .forward_m = forward_m});
   };
   send(5, 0, 1.0);
   EXPECT_NEAR(centre_m(*depth_now()), 10.0F, 0.02F) << "a proposal";
@@ -133,6 +144,15 @@ TEST_F(DepthTest, OnlyExtrinsicsThatPassedTakeEffectAndOnlyNewerOnes) {
   EXPECT_EQ(depth_now()->extrinsics_version(), 6U);
   send(4, 1, 2.0);
   EXPECT_NEAR(centre_m(*depth_now()), 11.0F, 0.02F) << "an old one, late";
+}
+
+TEST_F(DepthTest, ACalibrationThatWasRestartedIsHeard) {
+  DepthComponent component(fake_);
+  send_extrinsics({.version = 3, .applied = 1, .forward_m = 1.0, .stamp_ns = 300});
+  EXPECT_NEAR(centre_m(*depth_now()), 11.0F, 0.02F);
+  send_extrinsics({.version = 1, .applied = 1, .forward_m = 2.0, .stamp_ns = 400});
+  EXPECT_NEAR(centre_m(*depth_now()), 12.0F, 0.02F) << "it counts from one again";
+  EXPECT_EQ(depth_now()->extrinsics_version(), 1U);
 }
 
 TEST_F(DepthTest, EdgeTopicsAreSentWhileSomebodyReadsThem) {

@@ -4,6 +4,7 @@
 
 #include "camvox/component/component.hpp"
 #include "camvox/component/progress.hpp"
+#include "camvox/conversion/extrinsics_in_force.hpp"
 #include "camvox/depth/depth_projector.hpp"
 #include "camvox/depth_component/coloured_cloud.hpp"
 #include "camvox/depth_component/scan_accumulator.hpp"
@@ -60,8 +61,7 @@ class DepthComponent final : public Component {
   Context& context_;
   DepthComponentConfig config_;
   depth::DepthProjector projector_;
-  geometry::SE3 T_camera_lidar_;
-  std::uint64_t extrinsics_version_ = 0;
+  conversion::ExtrinsicsInForce extrinsics_;
   depth_component::ScanAccumulator accumulator_;
   std::deque<Sample<Cloud>> waiting_;  ///< In lockstep, for poses.
   std::uint64_t first_cloud_id_ = 0;
