@@ -35,10 +35,14 @@ DeskewComponent::DeskewComponent(Context& context)
     : context_(context),
       config_(context.parameters<DeskewComponentConfig>()),
       rig_(sensors::make_rig_calibration(config_.rig)),
-      T_camera_imu_(rig_.T_camera_lidar() * rig_.T_imu_lidar.inverse()),
+      extrinsics_(rig_.T_camera_lidar()),
+      T_camera_imu_(extrinsics_.T_camera_lidar() * rig_.T_imu_lidar.inverse()),
       filter_(config_.motion),
       progress_(context),
       clouds_(context.advertise<Cloud>({"cloud", topics::kCloud}, {.qos = qos::kFrames})) {
+  context.subscribe<Extrinsics>({"extrinsics", topics::kExtrinsics},
+                                [this](const auto& extrinsics) { on_extrinsics(*extrinsics); },
+                                {.qos = qos::kState, .required = false});
   context.subscribe<Scan>({"scan", topics::kScan},
                           [this](const auto& scan) { on_scan(scan); },
                           {.qos = qos::kFrames, .max_held = static_cast<int>(kMaxWaiting) + 1});
@@ -46,6 +50,13 @@ DeskewComponent::DeskewComponent(Context& context)
                                [this](const auto& pose) { on_pose(*pose); },
                                {.qos = qos::kKeyframes, .required = config_.lockstep});
   context.every(std::chrono::seconds(1), [this] { report(); });
+}
+
+void DeskewComponent::on_extrinsics(const Extrinsics& extrinsics) {
+  if (!extrinsics_.take(extrinsics)) return;
+  T_camera_imu_ = extrinsics_.T_camera_lidar() * rig_.T_imu_lidar.inverse();
+  filter_.forget_odometry();
+  context_.log().info("extrinsics version {} from now on", extrinsics_.version());
 }
 
 void DeskewComponent::on_scan(const Sample<Scan>& scan) {
@@ -144,10 +155,10 @@ lidar::ScanMotion DeskewComponent::motion_of(const Scan& scan, Cloud& cloud) {
     cloud.deskew(msg::DESKEW_CONSTANT_VELOCITY);
     const double duration_s = 1e-9 * static_cast<double>(last_step_->to_ns - last_step_->from_ns);
     const Vector6d velocity_camera = last_step_->T_from_to.log() / duration_s;
-    const auto velocity_lidar = lidar::velocity_at(velocity_camera, rig_.T_camera_lidar());
+    const auto velocity_lidar = lidar::velocity_at(velocity_camera, extrinsics_.T_camera_lidar());
     write(velocity_lidar.head<3>(), cloud.angular_velocity_lidar());
     write(velocity_lidar.tail<3>(), cloud.velocity_lidar());
-    return lidar::constant_scan_motion(velocity_camera, interval, rig_.T_camera_lidar());
+    return lidar::constant_scan_motion(velocity_camera, interval, extrinsics_.T_camera_lidar());
   }
   cloud.deskew(msg::DESKEW_NONE);
   return {};

@@ -38,6 +38,12 @@ void InertialMotionFilter::add_reading(const ImuReading& reading) {
   track_.forget_before(reading.stamp_ns - kLongest_ns);
 }
 
+void InertialMotionFilter::forget_odometry() {
+  known_ = false;
+  turn_to_ns_ = -1;
+  bias_variance_ = std::max(bias_variance_, square(config_.gyro_bias_sigma_rad_s));
+}
+
 void InertialMotionFilter::add_standstill(std::int64_t begin_ns, std::int64_t end_ns) {
   if (end_ns <= begin_ns || !track_.covers(begin_ns, end_ns, nanoseconds(config_.max_imu_gap_s))) {
     return;

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <numbers>
+
 #include "camvox/test/moving_rig.hpp"
 
 namespace camvox::lidar {
@@ -119,6 +122,35 @@ TEST(InertialMotionFilter, FollowsAClockThatWasSetBack) {
   for (const auto& reading : rig.imu(0, 2'000 * kMs, {})) filter.add_reading(reading);
   filter.add_odometry({0, kFrame_ns, step_of(rig, kFrame_ns, 0, 0)});
   EXPECT_TRUE(filter.predict(2 * kFrame_ns));
+}
+
+/// A steady turn of 0.8 rad/s about z without any bias, and odometry whose axes are turned about x.
+/// The difference of the two turns is 2 sin(error / 2) of it, which looks like bias.
+TEST(InertialMotionFilter, ForgetsWhatOdometrySaidInWrongAxes) {
+  constexpr double kRate_rad_s = 0.8;
+  const double error_rad = 3.0 * std::numbers::pi / 180.0;
+  InertialMotionFilter filter({.bias_interval_s = 0.2});
+  for (std::int64_t ms = 0; ms <= 10'000; ms += 5) {
+    filter.add_reading({ms * kMs, {0.0, 0.0, kRate_rad_s}, {0.0, 0.0, 9.8}});
+  }
+  const auto turn = [&](std::int64_t from_ns, std::int64_t to_ns, double wrong_rad) {
+    const auto R_wrong = geometry::SO3::exp({wrong_rad, 0.0, 0.0});
+    const auto R_step = geometry::SO3::exp({0.0, 0.0, 0.1 * kRate_rad_s});
+    const SE3 T_step(R_wrong.inverse() * R_step * R_wrong, {0.0, 0.0, 0.0});
+    for (auto ns = from_ns; ns < to_ns; ns += kFrame_ns) {
+      filter.add_odometry({ns, ns + kFrame_ns, T_step});
+    }
+  };
+  turn(0, 6'000 * kMs, error_rad);
+  const double booked_rad_s = 2.0 * std::sin(0.5 * error_rad) * kRate_rad_s;
+  EXPECT_NEAR(filter.gyro_bias_rad_s().norm(), booked_rad_s, 0.1 * booked_rad_s);
+  filter.forget_odometry();
+  EXPECT_FALSE(filter.predict(6'100 * kMs));
+  EXPECT_GE(filter.gyro_bias_sigma_rad_s(), filter.config().gyro_bias_sigma_rad_s);
+  // Ten comparisons of 1 mrad / 0.2 s against what it was, 10 mrad/s: 1 / (1 + 10 * 4) is left.
+  turn(6'000 * kMs, 8'000 * kMs, 0.0);
+  EXPECT_TRUE(filter.predict(8'100 * kMs));
+  EXPECT_LT(filter.gyro_bias_rad_s().norm(), 0.05 * booked_rad_s);
 }
 
 TEST(InertialMotionFilter, MemoryIsBoundedWithoutOdometry) {

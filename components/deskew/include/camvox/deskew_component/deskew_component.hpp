@@ -6,6 +6,7 @@
 
 #include "camvox/component/component.hpp"
 #include "camvox/component/progress.hpp"
+#include "camvox/conversion/extrinsics_in_force.hpp"
 #include "camvox/conversion/odometry_steps.hpp"
 #include "camvox/interfaces/camvox_interfaces.hpp"
 #include "camvox/lidar/deskew.hpp"
@@ -33,16 +34,19 @@ struct DeskewComponentConfig {
 /// Moves the returns of every scan to the lidar frame at the image's time: one cloud for each scan.
 /// What the motion was made of stands in Cloud::deskew; the best that the data allow is taken:
 /// gyro, accelerometer and odometry's velocity; gyro alone; constant velocity from odometry (no
-/// IMU); nothing, and then the points are as measured.
+/// IMU); nothing, and then the points are as measured. New extrinsics that passed their gate take
+/// effect at once: odometry is the camera's, the IMU sits on the lidar.
 class DeskewComponent final : public Component {
  public:
   explicit DeskewComponent(Context& context);
 
  private:
   using Cloud = camvox_interfaces::msg::Cloud;
+  using Extrinsics = camvox_interfaces::msg::Extrinsics;
   using FramePose = camvox_interfaces::msg::FramePose;
   using Scan = camvox_interfaces::msg::Scan;
 
+  void on_extrinsics(const Extrinsics& extrinsics);
   void on_scan(const Sample<Scan>& scan);
   void on_pose(const FramePose& pose);
   void process_waiting();
@@ -55,6 +59,7 @@ class DeskewComponent final : public Component {
   Context& context_;
   DeskewComponentConfig config_;
   sensors::RigCalibration rig_;
+  conversion::ExtrinsicsInForce extrinsics_;
   geometry::SE3 T_camera_imu_;
   lidar::InertialMotionFilter filter_;
   conversion::OdometrySteps steps_;

@@ -67,6 +67,9 @@ class InertialMotionFilter {
   void add_odometry(const OdometryStep& step);
   /// Odometry was interrupted: velocity is unknown until it goes on.
   void forget_velocity() { known_ = false; }
+  /// The axes of all odometry so far were wrong (new extrinsics): velocity is unknown until it goes
+  /// on, and the gyro bias, which took up their error, as uncertain as before anything was known.
+  void forget_odometry();
 
   /// The motion at a time at or after the last odometry step; nothing without odometry or when it
   /// is too old or the IMU has a gap.
