@@ -33,6 +33,7 @@ TrackingComponent::TrackingComponent(Context& context)
     : context_(context),
       config_(context.parameters<TrackingComponentConfig>()),
       rig_(sensors::make_rig_calibration(config_.rig)),
+      extrinsics_(rig_.T_camera_lidar()),
       R_camera_imu_((rig_.T_imu_lidar * rig_.T_lidar_camera).inverse().rotation()),
       builder_(config_.frame, config_.camera),
       tracker_(tracker_config(config_), builder_.tracking_camera(), rig_.T_body_camera),
@@ -59,6 +60,10 @@ TrackingComponent::TrackingComponent(Context& context)
   context.subscribe<msg::DepthImage>(
       {"depth_image", topics::kDepthImage}, collect, {.qos = qos::kFrames, .max_held = kHeld});
   if (config_.use_imu) {
+    context.subscribe<msg::Extrinsics>(
+        {"extrinsics", topics::kExtrinsics},
+        [this](const auto& extrinsics) { on_extrinsics(*extrinsics); },
+        {.qos = qos::kState, .required = false});
     context.subscribe<msg::Cloud>({"cloud", topics::kCloud},
                                   [this, collect](const auto& cloud) {
                                     remember_rotation(*cloud);
@@ -74,6 +79,13 @@ TrackingComponent::TrackingComponent(Context& context)
       {"relocalisation_answer", topics::kRelocalisationAnswer},
       [this](const auto& answer) { on_answer(*answer); },
       {.required = false});
+}
+
+void TrackingComponent::on_extrinsics(const msg::Extrinsics& extrinsics) {
+  if (!extrinsics_.take(extrinsics)) return;
+  // The IMU moves with the lidar.
+  R_camera_imu_ = extrinsics_.T_camera_lidar().rotation() * rig_.T_imu_lidar.rotation().inverse();
+  context_.log().info("extrinsics version {} from now on", extrinsics_.version());
 }
 
 void TrackingComponent::on_map(const LocalMap& map) {

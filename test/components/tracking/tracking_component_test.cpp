@@ -2,6 +2,8 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
+#include <numbers>
 #include <random>
 
 #include "camvox/component/fake_context.hpp"
@@ -221,6 +223,44 @@ TEST_F(TrackingComponentTest, FollowsWithAGyro) {
   ASSERT_EQ(poses().size(), 3U);
   EXPECT_EQ(poses()[2]->state(), msg::TRACKING_OK);
   EXPECT_LT((p_map_body(*poses()[2]) - Eigen::Vector3d(0.0, -0.08, 0.0)).norm(), 0.01);
+}
+
+// The images stand still and the gyro, believed above all, says 4 mrad (a pixel) about the IMU's z:
+// what axis of the camera that is, is up to the extrinsics. Turned by 90 degrees about the camera's
+// x, its -y becomes -z.
+TEST_F(TrackingComponentTest, TurnsTheGyroByTheExtrinsicsInForce) {
+  constexpr double kTurn_rad = 0.004;
+  const auto camera_turn = [&](std::uint64_t frame_id) {
+    fake_.send<msg::Cloud>("cloud", [&](msg::Cloud& cloud) {
+      fill_header(cloud.header(), frame_id);
+      cloud.rotation_imu() = {0.0, 0.0, std::sin(0.5 * kTurn_rad), std::cos(0.5 * kTurn_rad)};
+    });
+    send(frame_id, 0);
+    const auto& sent = poses();
+    const auto T_before = conversion::to_se3(sent.at(frame_id - 2)->T_map_camera());
+    return (T_before.inverse() * conversion::to_se3(sent.back()->T_map_camera())).rotation().log();
+  };
+  const auto send_extrinsics = [&](std::uint64_t version, std::uint8_t applied) {
+    const auto turned = geometry::SO3::exp({0.5 * std::numbers::pi, 0.0, 0.0});
+    const auto T_camera_lidar = sensors::make_rig_calibration().T_camera_lidar();
+    msg::Extrinsics extrinsics;
+    extrinsics.version(version);
+    extrinsics.applied(applied);
+    extrinsics.T_camera_lidar(
+        conversion::to_array(geometry::SE3(turned, {0.0, 0.0, 0.0}) * T_camera_lidar));
+    fake_.send("extrinsics", extrinsics);
+  };
+  fake_.set_parameter("use_imu", true);
+  fake_.set_parameter("tracker.gyro_sigma_deg", 1e-4);
+  start();
+  fake_.send<msg::Cloud>("cloud", [&](msg::Cloud& cloud) { fill_header(cloud.header(), 1); });
+  send(1, 0);
+  const Eigen::Vector3d about_y(0.0, -kTurn_rad, 0.0);
+  EXPECT_LT((camera_turn(2) - about_y).norm(), 0.1 * kTurn_rad);
+  send_extrinsics(1, 0);
+  EXPECT_LT((camera_turn(3) - about_y).norm(), 0.1 * kTurn_rad) << "only proposed";
+  send_extrinsics(1, 1);
+  EXPECT_LT((camera_turn(4) - Eigen::Vector3d(0.0, 0.0, -kTurn_rad)).norm(), 0.1 * kTurn_rad);
 }
 
 TEST_F(TrackingComponentTest, BlackImageIsLostAndAsksNobodyUntilItSeesSomething) {

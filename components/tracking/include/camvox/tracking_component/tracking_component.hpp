@@ -7,6 +7,7 @@
 
 #include "camvox/component/component.hpp"
 #include "camvox/component/progress.hpp"
+#include "camvox/conversion/extrinsics_in_force.hpp"
 #include "camvox/interfaces/camvox_interfaces.hpp"
 #include "camvox/interfaces/nav_msgs.hpp"
 #include "camvox/interfaces/tf2_msgs.hpp"
@@ -56,7 +57,8 @@ struct TrackingComponentConfig {
 /// complete frame counts and what it overtakes is dropped and counted; a frame whose depth does not
 /// come is tracked without when the next one is complete. In lockstep a frame also waits for the
 /// answer to the relocalisation request of the one before, if anybody listens to requests. Tracking
-/// goes on without mapping; what mapping lacks when it is there (again), it gets sent again.
+/// goes on without mapping; what mapping lacks when it is there (again), it gets sent again. The
+/// gyro's turns are seen through the extrinsics in force.
 class TrackingComponent final : public Component {
  public:
   explicit TrackingComponent(Context& context);
@@ -66,6 +68,7 @@ class TrackingComponent final : public Component {
   using Answer = camvox_interfaces::msg::RelocalisationAnswer;
   using FrameInputs = tracking_component::FrameInputs;
 
+  void on_extrinsics(const camvox_interfaces::msg::Extrinsics& extrinsics);
   void on_map(const LocalMap& map);
   void on_answer(const Answer& answer);
   void send_again(const LocalMap& map);
@@ -82,6 +85,7 @@ class TrackingComponent final : public Component {
   Context& context_;
   TrackingComponentConfig config_;
   sensors::RigCalibration rig_;
+  conversion::ExtrinsicsInForce extrinsics_;
   geometry::SO3 R_camera_imu_;
   tracking::FrameBuilder builder_;
   tracking::Tracker tracker_;
