@@ -1,64 +1,11 @@
 #include "camvox/tracking/tracker.hpp"
 
-#include <gtest/gtest.h>
-
 #include <random>
 
-#include "camvox/test/founded_map.hpp"
-#include "camvox/test/tunnel_world.hpp"
+#include "tracker_fixture.hpp"
 
 namespace camvox::tracking {
 namespace {
-
-using geometry::SE3;
-using geometry::SO3;
-using test::FoundedMap;
-using test::TunnelWorld;
-
-constexpr std::int64_t kFrame_ns = 100'000'000;
-
-/// A tracker in a feature world, with a map that stays as founded.
-class TrackerTest : public testing::Test {
- protected:
-  void start(const TrackerConfig& config = {}) {
-    tracker_.emplace(config, world_.camera(), TunnelWorld::T_body_camera());
-    map_.emplace(world_.camera());
-  }
-  /// The next frame, seen from where the body is; the map follows at once.
-  const FrameResult& step(const SE3& T_world_body,
-                          const TunnelWorld::View& view = TunnelWorld::View(),
-                          const std::optional<SO3>& R_previous_camera = std::nullopt) {
-    ++frame_id_;
-    auto frame = world_.see(T_world_body * TunnelWorld::T_body_camera(), frame_id_, now_ns_, view);
-    frame.R_previous_camera = R_previous_camera;
-    now_ns_ += kFrame_ns;
-    result_ = tracker_->track(std::move(frame));
-    keyframes_ += result_.keyframe ? 1 : 0;
-    if (result_.keyframe) map_->insert(*result_.keyframe);
-    tracker_->update_map(map_->local_map(frame_id_));
-    return result_;
-  }
-  const FrameResult& step_blind() {
-    TunnelWorld::View view;
-    view.max_features = 0;
-    return step(SE3(), view);
-  }
-  [[nodiscard]] static SE3 at(double x_m, double yaw_rad = 0.0) {
-    return {SO3::exp({0.0, 0.0, yaw_rad}), {x_m, 0.3 * std::sin(0.1 * x_m), 0.0}};
-  }
-  [[nodiscard]] double error_m(const SE3& T_world_body) const {
-    const SE3 T_map_body = result_.T_map_camera * TunnelWorld::T_body_camera().inverse();
-    return (T_map_body.translation() - T_world_body.translation()).norm();
-  }
-
-  TunnelWorld world_;
-  std::optional<Tracker> tracker_;
-  std::optional<FoundedMap> map_;
-  FrameResult result_;
-  std::uint64_t frame_id_ = 0;
-  std::int64_t now_ns_ = 1'000'000'000;
-  int keyframes_ = 0;
-};
 
 // Landmarks are known to 2 cm of depth and 0.5 px, so 30 m of way over some 10 keyframes leaves
 // some centimetres.
@@ -248,18 +195,8 @@ TEST_F(TrackerTest, CorrectionsMoveTheMapNotOdometry) {
   for (int i = 0; i <= 20; ++i) step(at(0.3 * i));
   const SE3 T_odom_before = result_.T_odom_camera;
   const SE3 T_map_before = result_.T_map_camera;
-  // A loop was closed: everything moves and turns.
   const SE3 T_new_old(SO3::exp({0.0, 0.0, 0.1}), {2.0, -1.0, 0.5});
-  LocalMap corrected = map_->local_map(frame_id_ + 1);
-  corrected.map_epoch = 1;
-  for (auto& keyframe : corrected.keyframes) {
-    keyframe.T_map_camera = T_new_old * keyframe.T_map_camera;
-  }
-  for (auto& landmark : corrected.landmarks) {
-    landmark.p_map = T_new_old * landmark.p_map;
-    landmark.f_map = (T_new_old.rotation() * landmark.f_map.cast<double>()).cast<float>();
-  }
-  tracker_->update_map(corrected);
+  tracker_->update_map(corrected_map(T_new_old));
   step(at(6.3));  // the founded map that step sends is of an old epoch, and ignored
   ASSERT_TRUE(result_.has_pose());
   EXPECT_EQ(result_.map_epoch, 1U);
@@ -267,74 +204,6 @@ TEST_F(TrackerTest, CorrectionsMoveTheMapNotOdometry) {
   const SE3 T_step_odom = T_odom_before.inverse() * result_.T_odom_camera;
   EXPECT_LT(geometry::local(T_step_map, T_step_odom).norm(), 1e-9);
   EXPECT_NEAR(T_step_odom.translation().z(), 0.3, 0.03);
-}
-
-TEST_F(TrackerTest, AsksForItsPlaceAndTakesTheAnswer) {
-  start();
-  for (int i = 0; i <= 20; ++i) step(at(0.5 * i));
-  TunnelWorld elsewhere(99);
-  // Kidnapped to where nothing is known.
-  std::swap(world_, elsewhere);
-  step(at(0.0));
-  EXPECT_EQ(result_.state, TrackingState::kLost);
-  ASSERT_TRUE(result_.relocalisation_request);
-  EXPECT_EQ(result_.relocalisation_request->landmark_ids.size(),
-            result_.relocalisation_request->features.size());
-  const auto lost_id = frame_id_;
-  step(at(0.5));
-  EXPECT_FALSE(result_.relocalisation_request) << "asks only every few frames";
-  // An answer to another frame counts for nothing.
-  tracker_->relocalise({lost_id + 7, 0, 3, SE3()});
-  EXPECT_EQ(tracker_->state(), TrackingState::kLost);
-  tracker_->relocalise({lost_id, 0, 1, at(2.0) * TunnelWorld::T_body_camera()});
-  EXPECT_EQ(tracker_->state(), TrackingState::kRelocalising);
-  std::swap(world_, elsewhere);
-  step(at(2.1));
-  EXPECT_EQ(result_.state, TrackingState::kTracking);
-  EXPECT_LT(error_m(at(2.1)), 0.05);
-}
-
-// Seen from elsewhere or in other light nothing looks enough like the map to be found among all
-// features of an image. Where the place was proposed, its pose tells where each must be.
-TEST_F(TrackerTest, AtAProposedPlaceThePoseTellsWhereToLook) {
-  start();
-  for (int i = 0; i <= 20; ++i) step(at(0.5 * i));
-  const auto step_in_other_light = [this](const SE3& T_world_body) {
-    auto frame = world_.see(T_world_body * TunnelWorld::T_body_camera(), ++frame_id_, now_ns_);
-    std::mt19937 random(static_cast<unsigned>(frame_id_));
-    for (auto& descriptor : frame.features.descriptors) {
-      for (int bit = 0; bit < 70; ++bit) {
-        descriptor.bytes[random() % 32] ^= static_cast<std::uint8_t>(1U << (random() % 8));
-      }
-    }
-    now_ns_ += kFrame_ns;
-    result_ = tracker_->track(std::move(frame));
-  };
-  step_blind();
-  for (int i = 0; i < 10; ++i) {
-    step_in_other_light(at(2.0));
-    ASSERT_EQ(result_.state, TrackingState::kLost) << "found by looks alone";
-    if (result_.relocalisation_request) break;
-  }
-  ASSERT_TRUE(result_.relocalisation_request);
-  tracker_->relocalise({frame_id_, 0, 1, at(2.0) * TunnelWorld::T_body_camera()});
-  step_in_other_light(at(2.1));
-  EXPECT_EQ(result_.state, TrackingState::kTracking);
-  EXPECT_LT(error_m(at(2.1)), 0.05);
-}
-
-TEST_F(TrackerTest, AWrongPlaceIsNotTaken) {
-  start();
-  for (int i = 0; i <= 20; ++i) step(at(0.5 * i));
-  world_ = TunnelWorld(99);
-  ASSERT_TRUE(step(at(2.0)).relocalisation_request);
-  tracker_->relocalise({frame_id_, 0, 1, at(2.0) * TunnelWorld::T_body_camera()});
-  for (int i = 1; i <= 10; ++i) {
-    step(at(2.0 + 0.1 * i));
-    EXPECT_EQ(result_.state, TrackingState::kRelocalising) << i;
-  }
-  step(at(3.1));
-  EXPECT_EQ(result_.state, TrackingState::kLost);
 }
 
 TEST_F(TrackerTest, LocalisationOnlyMakesNoKeyframes) {
