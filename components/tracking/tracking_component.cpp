@@ -92,7 +92,10 @@ void TrackingComponent::on_map(const LocalMap& map) {
   const auto work = progress_.measure();
   if (map.header().frame_id() >= map_frame_id_) {  // one that was overtaken says nothing new
     map_frame_id_ = map.header().frame_id();
-    tracker_.update_map(conversion::read_local_map(map));
+    if (!tracker_.update_map(conversion::read_local_map(map))) {
+      context_.log().warn("mapping has a map that was there before: looking for the place in it");
+      store_.clear();
+    }
     send_again(map);
   }
   process_ready();

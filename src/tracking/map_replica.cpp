@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <utility>
 
+#include "camvox/features/hamming.hpp"
+#include "camvox/features/match.hpp"
+
 namespace camvox::tracking {
 
 bool MapReplica::apply(LocalMap map) {
@@ -31,6 +34,28 @@ bool MapReplica::apply(LocalMap map) {
     append(own);
   }
   return true;
+}
+
+bool MapReplica::is_foreign(const LocalMap& map) const {
+  if (empty() || map.keyframes.empty()) return false;
+  return map.keyframes.back().id >= next_keyframe_id_ || shows_other_landmarks(map);
+}
+
+// Mapping leaves a landmark's looks as they were founded, or takes another view's of the same
+// point. Under the id of another map's landmark is another point.
+bool MapReplica::shows_other_landmarks(const LocalMap& map) const {
+  int alike = 0, others = 0;
+  auto theirs = map.landmarks.begin();
+  for (const auto& pending : pending_) {
+    for (const auto& own : pending.landmarks) {
+      while (theirs != map.landmarks.end() && theirs->id < own.id) ++theirs;
+      if (theirs == map.landmarks.end()) return others > alike;
+      if (theirs->id != own.id) continue;
+      const int distance = features::hamming_distance(theirs->descriptor, own.descriptor);
+      ++(distance <= features::kPermissiveDistance ? alike : others);
+    }
+  }
+  return others > alike;
 }
 
 void MapReplica::move_with_parent(Pending& pending) const {

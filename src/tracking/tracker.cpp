@@ -62,19 +62,21 @@ FrameResult Tracker::track(Frame frame) {
   }
 
   std::optional<PoseEstimate> estimate;
+  bool followed = false;
   if (result.statistics.features >= kMinFeatures) {
     if (state_ == TrackingState::kWaiting && map_.empty()) {
       if (result.statistics.features_with_depth >= config_.min_features_with_depth) {
         start_map(frame, matcher, result);
         return result;
       }
-    } else if (is_tracked()) {
-      estimate = follow(frame, matcher);
     } else {
-      estimate = find_again(frame, matcher);
+      if (is_tracked()) estimate = follow(frame, matcher);
+      followed = estimate.has_value();
+      if (!followed) estimate = find_again(frame, matcher);
     }
   }
   if (estimate) {
+    observe_speed(frame, *estimate, followed);
     accept(frame, matcher, *estimate, result);
   } else {
     lose(frame, result);
@@ -112,7 +114,7 @@ std::optional<PosePrior> Tracker::gyro_prior(const Frame& frame, const SE3& T_ma
   return prior;
 }
 
-// First near where the motion predicts each landmark, then in a wider circle, then by looks alone.
+// First near where the motion predicts each landmark, then in a wider circle.
 std::optional<PoseEstimate> Tracker::follow(const Frame& frame, FrameMatcher& matcher) {
   const double dt_s = static_cast<double>(frame.stamp_ns - last_.stamp_ns) * kNsToS;
   const SE3 T_predicted = last_.T_map_camera * motion_.predict(dt_s, frame.R_previous_camera);
@@ -130,7 +132,7 @@ std::optional<PoseEstimate> Tracker::follow(const Frame& frame, FrameMatcher& ma
     const bool enough = estimate && estimate->inliers >= config_.min_inliers;
     if (enough && is_possible(frame, *estimate)) return estimate;
   }
-  return find_again(frame, matcher);
+  return std::nullopt;
 }
 
 std::optional<PoseEstimate> Tracker::find_again(const Frame& frame, FrameMatcher& matcher) {
@@ -176,6 +178,14 @@ bool Tracker::is_possible(const Frame& frame, const PoseEstimate& estimate) {
   return false;
 }
 
+// A step to a pose found anew is one that the camera has made if it was held against the limit:
+// otherwise the last pose may have been another map's, or a proposal.
+void Tracker::observe_speed(const Frame& frame, const PoseEstimate& estimate, bool followed) {
+  const double dt_s = static_cast<double>(frame.stamp_ns - last_.stamp_ns) * kNsToS;
+  if (dt_s <= 0.0 || !(followed || limit_.knows_velocity())) return;
+  limit_.observe(last_.T_map_camera.inverse() * estimate.T_world_camera, dt_s);
+}
+
 std::optional<PoseEstimate> Tracker::refine(FrameMatcher& matcher,
                                             const SE3& T_map_camera,
                                             double radius_px,
@@ -196,7 +206,6 @@ void Tracker::accept(Frame& frame,
   } else {
     motion_.reset();
   }
-  if (state_ != TrackingState::kRelocalising && dt_s > 0.0) limit_.observe(T_last_camera, dt_s);
   state_ = config_.localisation_only ? TrackingState::kLocalisationOnly : TrackingState::kTracking;
   frames_lost_ = 0;
   requested_frame_id_.reset();
@@ -215,12 +224,7 @@ void Tracker::accept(Frame& frame,
 }
 
 void Tracker::lose(Frame& frame, FrameResult& result) {
-  if (is_tracked()) {
-    state_ = TrackingState::kLost;
-    motion_.reset();
-    frames_lost_ = 0;
-    frames_since_request_ = config_.relocalisation_interval;
-  }
+  if (is_tracked()) give_up_pose();
   if (state_ == TrackingState::kWaiting) return;
   ++frames_lost_;
   ++frames_since_request_;
@@ -254,7 +258,33 @@ void Tracker::relocalisation_failed(std::uint64_t frame_id) {
   if (requested_frame_id_ == frame_id) requested_frame_id_.reset();
 }
 
-void Tracker::update_map(LocalMap map) {
+void Tracker::give_up_pose() {
+  state_ = TrackingState::kLost;
+  motion_.reset();
+  frames_lost_ = 0;
+  frames_since_request_ = config_.relocalisation_interval;
+}
+
+// The pose was one in a map that nobody else has. A place that was proposed meanwhile is one in the
+// other map.
+void Tracker::leave_map_for(const LocalMap& other) {
+  map_.clear();
+  limit_.forget();
+  if (state_ == TrackingState::kRelocalising) return;
+  give_up_pose();
+  reference_id_ = other.keyframes.back().id;
+  last_.T_map_camera = other.keyframes.back().T_map_camera;
+  last_.landmark_ids.assign(last_.landmark_ids.size(), 0);
+}
+
+bool Tracker::update_map(LocalMap map) {
+  const bool foreign = map_.is_foreign(map);
+  if (foreign) leave_map_for(map);
+  follow_map(std::move(map));
+  return !foreign;
+}
+
+void Tracker::follow_map(LocalMap map) {
   const auto T_map_old = map_.T_map_keyframe(reference_id_);
   const auto old_keyframes = map_.keyframes();
   if (!map_.apply(std::move(map))) return;

@@ -200,6 +200,28 @@ TEST_F(TrackingComponentTest, WhatMappingLacksIsSentAgain) {
             fake_.published<msg::Keyframe>("keyframe")[0]->features_count());
 }
 
+// Mapping has outlived the tracking before: keyframe 1 is another one there.
+TEST_F(TrackingComponentTest, WhatBelongsToNoMapIsNotSentAgain) {
+  start();
+  send(1, 0);
+  const auto send_older_map = [this](std::uint64_t frame_id, std::uint64_t next_keyframe_id) {
+    fake_.send<msg::LocalMap>("local_map", [&](msg::LocalMap& map) {
+      fill_header(map.header(), frame_id);
+      map.keyframe_ids()[0] = 7;
+      map.keyframe_poses()[0] = conversion::to_array(geometry::SE3());
+      map.keyframe_ids_count(1);
+      map.keyframe_poses_count(1);
+      map.next_keyframe_id(next_keyframe_id);
+    });
+  };
+  send_older_map(1, 8);
+  send(2, 4);
+  EXPECT_EQ(poses().back()->state(), msg::TRACKING_LOST);
+  EXPECT_EQ(fake_.published<msg::Keyframe>("relocalisation_request").size(), 1U);
+  send_older_map(2, 1);  // of a mapping that was restarted
+  EXPECT_TRUE(fake_.published<msg::Keyframe>("resent_keyframe").empty());
+}
+
 TEST_F(TrackingComponentTest, WithImuAFrameWaitsForItsCloud) {
   fake_.set_parameter("use_imu", true);
   start();

@@ -116,6 +116,31 @@ TEST_F(MapReplicaTest, AMapThatWasRestartedIsIgnoredUntilItHasCaughtUp) {
   EXPECT_TRUE(replica_.apply(whole));
 }
 
+TEST_F(MapReplicaTest, AMapWithKeyframesThatWereNeverMadeIsForeign) {
+  LocalMap map = local_map(10, 0, {5});
+  map.keyframes.push_back({2, SE3()});
+  map.next_keyframe_id = 3;
+  EXPECT_FALSE(replica_.is_foreign(map)) << "nothing is here";
+  replica_.add(keyframe(1, 9));
+  EXPECT_FALSE(replica_.is_foreign(LocalMap()));
+  EXPECT_TRUE(replica_.is_foreign(map));
+  replica_.add(keyframe(2, 10));
+  EXPECT_FALSE(replica_.is_foreign(map));
+}
+
+// The looks of the landmark that keyframe 1 founded, of which mapping may have seen more.
+TEST_F(MapReplicaTest, AMapWithOtherLandmarksUnderTheSameIdsIsForeign) {
+  replica_.add(keyframe(1, 9));
+  LocalMap map = local_map(10, 0, {landmark_id(1, 0), landmark_id(1, 1)});
+  EXPECT_FALSE(replica_.is_foreign(map));
+  map.landmarks[0].descriptor.bytes.fill(0x11);  // 64 bits of 256: another view
+  EXPECT_FALSE(replica_.is_foreign(map));
+  map.landmarks[0].descriptor.bytes.fill(0x55);  // 128 bits: another point
+  EXPECT_TRUE(replica_.is_foreign(map));
+  ASSERT_TRUE(replica_.apply(local_map(10, 0, {landmark_id(1, 0)})));
+  EXPECT_FALSE(replica_.is_foreign(map)) << "mapping had the keyframe: its landmarks are its own";
+}
+
 TEST_F(MapReplicaTest, BansWhatDisagreesAndRemembersItFromMapToMap) {
   ASSERT_TRUE(replica_.apply(local_map(10, 0, {5, 6, 7})));
   const auto index = *replica_.find(6);

@@ -73,5 +73,65 @@ TEST_F(TrackerTest, AWrongPlaceIsNotTaken) {
   EXPECT_EQ(result_.state, TrackingState::kLost);
 }
 
+// A tracker that was started anew while mapping lives on founds a map before it hears of the one
+// that is there, in which its first keyframe is another. 20 m from the origin: with the place
+// proposed, then with looks alone.
+TEST_F(TrackerTest, StartedAnewItFindsItsPlaceInTheMapThatIsThere) {
+  for (const bool with_answers : {true, false}) {
+    world_ = TunnelWorld();
+    start();
+    for (int i = 0; i <= 40; ++i) step(at(0.5 * i));
+    const auto newest = map_->poses().rbegin()->first;
+    tracker_.emplace(TrackerConfig(), world_.camera(), TunnelWorld::T_body_camera());
+    step(at(20.0));
+    EXPECT_EQ(tracker_->state(), TrackingState::kLost) << "what it founded is worth nothing";
+    int lost = 0;
+    for (int i = 0; i <= 60; ++i) {
+      const SE3 T = at(i < 30 ? 20.0 : 20.0 + 0.1 * (i - 30));
+      step(T);
+      lost += result_.has_pose() ? 0 : 1;
+      ASSERT_LT(result_.has_pose() ? error_m(T) : 0.0, 0.1) << i;
+      EXPECT_GT(result_.keyframe ? result_.keyframe->id : newest + 1, newest);
+      if (!with_answers || !result_.relocalisation_request) continue;
+      tracker_->relocalise({frame_id_, 0, newest, at(20.0) * TunnelWorld::T_body_camera()});
+    }
+    EXPECT_TRUE(result_.has_pose());
+    EXPECT_LE(lost, 1) << with_answers;
+    EXPECT_EQ(result_.statistics.refused_poses, 0) << with_answers;
+  }
+}
+
+// The same in a map of a single keyframe, which has the id and the pose of the one just made.
+TEST_F(TrackerTest, StartedAnewItKnowsAnotherKeyframeOneByItsLandmarks) {
+  start();
+  step(at(0.0));
+  tracker_.emplace(TrackerConfig(), world_.camera(), TunnelWorld::T_body_camera());
+  step(at(3.0));
+  for (int i = 0; i < 10; ++i) {
+    step(at(3.0));
+    ASSERT_TRUE(result_.has_pose()) << i;
+    ASSERT_LT(error_m(at(3.0)), 0.1) << i;
+  }
+}
+
+// What is wrong with the last pose says nothing of the speed: a place was proposed wrongly, then
+// the right one is found by looks, 8 m from there.
+TEST_F(TrackerTest, TheStepFromAWrongProposalIsNoSpeed) {
+  start();
+  for (int i = 0; i <= 20; ++i) step(at(0.5 * i));
+  TunnelWorld elsewhere(99);
+  std::swap(world_, elsewhere);
+  ASSERT_TRUE(step(at(2.0)).relocalisation_request);
+  tracker_->relocalise({frame_id_, 0, 1, at(2.0) * TunnelWorld::T_body_camera()});
+  for (int i = 0; i <= 10; ++i) step(at(2.0));
+  ASSERT_EQ(result_.state, TrackingState::kLost);
+  std::swap(world_, elsewhere);
+  for (int i = 0; i < 10; ++i) {
+    step(at(10.0));
+    ASSERT_TRUE(result_.has_pose()) << i;
+    ASSERT_LT(error_m(at(10.0)), 0.05) << i;
+  }
+}
+
 }  // namespace
 }  // namespace camvox::tracking

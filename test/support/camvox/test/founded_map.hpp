@@ -14,7 +14,9 @@ class FoundedMap {
  public:
   explicit FoundedMap(const tracking::TrackingCamera& camera) : camera_(camera) {}
 
+  /// Like mapping, does nothing for an id that is there already.
   void insert(const tracking::Keyframe& keyframe) {
+    if (poses_.contains(keyframe.id)) return;
     poses_[keyframe.id] = keyframe.T_map_camera;
     auto& own = landmarks_[keyframe.id];
     for (std::size_t i = 0; i < keyframe.landmark_ids.size(); ++i) {

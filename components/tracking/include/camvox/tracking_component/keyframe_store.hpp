@@ -24,6 +24,9 @@ class KeyframeStore {
   /// Takes a keyframe that was just sent.
   void add(tracking::Keyframe keyframe);
 
+  /// For keyframes of another map, whose ids mean others now.
+  void clear() { *this = KeyframeStore(capacity_); }
+
   /// What mapping shall get again, oldest first, from what its newest local map says: it has dealt
   /// with all keyframes below `next_id`, and has seen frame `map_frame_id`. `frame_id`: the frame
   /// that tracking has come to.

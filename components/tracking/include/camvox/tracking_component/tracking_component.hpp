@@ -57,8 +57,9 @@ struct TrackingComponentConfig {
 /// complete frame counts and what it overtakes is dropped and counted; a frame whose depth does not
 /// come is tracked without when the next one is complete. In lockstep a frame also waits for the
 /// answer to the relocalisation request of the one before, if anybody listens to requests. Tracking
-/// goes on without mapping; what mapping lacks when it is there (again), it gets sent again. The
-/// gyro's turns are seen through the extrinsics in force.
+/// goes on without mapping; what mapping lacks when it is there (again), it gets sent again.
+/// Started anew while mapping goes on, it founds a map until it hears of the one that is there, and
+/// then looks for its place in that. The gyro's turns are seen through the extrinsics in force.
 class TrackingComponent final : public Component {
  public:
   explicit TrackingComponent(Context& context);

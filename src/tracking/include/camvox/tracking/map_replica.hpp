@@ -23,6 +23,9 @@ class MapReplica {
   /// empty map, for one older than the present one, and for one that knows fewer keyframes: mapping
   /// was restarted and has not caught up.
   bool apply(LocalMap map);
+  /// Whether the map cannot have been made of what is here: it has keyframes that were never made
+  /// here, or something else under the ids of those that were.
+  [[nodiscard]] bool is_foreign(const LocalMap& map) const;
   /// Adds a keyframe just made, and the landmarks that it founded.
   void add(const Keyframe& keyframe);
   void clear();
@@ -64,6 +67,7 @@ class MapReplica {
   };
 
   void append(const Pending& pending);
+  [[nodiscard]] bool shows_other_landmarks(const LocalMap& map) const;
   void move_with_parent(Pending& pending) const;
 
   optimization::PinholeCamera camera_;

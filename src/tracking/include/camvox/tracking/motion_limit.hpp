@@ -18,6 +18,8 @@ class MotionLimit {
   void observe(const geometry::SE3& T_last_camera, double dt_s);
   /// The next pose may be anywhere, e.g. after relocalisation.
   void forget() { velocity_mps_.reset(); }
+  /// Whether it can refuse anything.
+  [[nodiscard]] bool knows_velocity() const { return velocity_mps_.has_value(); }
 
   /// Whether the camera may have moved so within `dt_s` after the last accepted pose, of which
   /// `sigma_m` is the standard deviation. True while the velocity is not known.

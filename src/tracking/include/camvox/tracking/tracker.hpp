@@ -31,8 +31,11 @@ class Tracker {
 
   [[nodiscard]] FrameResult track(Frame frame);
 
-  /// Takes in the newest local map. The pose goes along with its reference keyframe.
-  void update_map(LocalMap map);
+  /// Takes in the newest local map. The pose goes along with its reference keyframe. Returns false
+  /// when it is another map than the one that this tracker has founded (mapping outlived the
+  /// tracker before): own keyframes count for nothing then, and the place in that map is looked
+  /// for.
+  bool update_map(LocalMap map);
 
   /// Answers to relocalisation requests: the place was found, or it was not.
   void relocalise(const RelocalisationHint& hint);
@@ -51,6 +54,7 @@ class Tracker {
   [[nodiscard]] Estimate find_by_looks(FrameMatcher& matcher) const;
   /// False, and counted, when nothing could have carried the camera there.
   [[nodiscard]] bool is_possible(const Frame& frame, const optimization::PoseEstimate& estimate);
+  void observe_speed(const Frame& frame, const optimization::PoseEstimate& estimate, bool followed);
   [[nodiscard]] Estimate refine(FrameMatcher& matcher,
                                 const geometry::SE3& T_map_camera,
                                 double radius_px,
@@ -63,6 +67,9 @@ class Tracker {
               const optimization::PoseEstimate& estimate,
               FrameResult& result);
   void lose(Frame& frame, FrameResult& result);
+  void give_up_pose();
+  void follow_map(LocalMap map);
+  void leave_map_for(const LocalMap& other);
   void remember(const Frame& frame, const FrameMatcher& matcher, const geometry::SE3& T_map_camera);
   void choose_reference(double median_depth_m);
   [[nodiscard]] bool is_keyframe_due(const Frame& frame,
