@@ -19,6 +19,7 @@ constexpr int kMinFeaturesToAsk = 50;   ///< Fewer are not worth a relocalisatio
 constexpr double kWideSearch = 3.0;     ///< Search radius after a pose found by looks alone.
 constexpr double kReferenceGain = 0.8;  ///< Another keyframe must be that much nearer.
 constexpr int kMaxRelocalisingFrames = 10;
+constexpr int kMaxFramesToCome = 50;  ///< For the map of a proposed place.
 constexpr double kNsToS = 1e-9;
 
 std::optional<PoseEstimate> if_ok(PoseEstimate estimate) {
@@ -96,6 +97,7 @@ void Tracker::remember(const Frame& frame, const FrameMatcher& matcher, const SE
   last_.frame_id = frame.frame_id;
   last_.stamp_ns = frame.stamp_ns;
   last_.T_map_camera = T_map_camera;
+  place_epoch_ = map_.map_epoch();
   last_.key_points = frame.features.key_points;
   last_.landmark_ids.assign(frame.features.size(), 0);
   for (std::size_t i = 0; i < frame.features.size(); ++i) {
@@ -137,7 +139,7 @@ std::optional<PoseEstimate> Tracker::follow(const Frame& frame, FrameMatcher& ma
 
 std::optional<PoseEstimate> Tracker::find_again(const Frame& frame, FrameMatcher& matcher) {
   // At a place just proposed, nothing can be found before its map has come.
-  if (map_.empty() || !map_.T_map_keyframe(reference_id_)) return std::nullopt;
+  if (!has_map_of_place()) return std::nullopt;
   auto estimate = state_ == TrackingState::kRelocalising ? find_at_hint(matcher) : std::nullopt;
   if (!estimate) estimate = find_by_looks(matcher);
   if (!estimate || !is_possible(frame, *estimate)) return std::nullopt;
@@ -228,8 +230,10 @@ void Tracker::lose(Frame& frame, FrameResult& result) {
   if (state_ == TrackingState::kWaiting) return;
   ++frames_lost_;
   ++frames_since_request_;
-  if (state_ == TrackingState::kRelocalising && frames_lost_ > kMaxRelocalisingFrames) {
+  const int patience = has_map_of_place() ? kMaxRelocalisingFrames : kMaxFramesToCome;
+  if (state_ == TrackingState::kRelocalising && frames_lost_ > patience) {
     state_ = TrackingState::kLost;
+    place_epoch_ = map_.map_epoch();  // in what is here it may be found by looks
   }
   const bool ask = state_ == TrackingState::kLost &&
                    frames_since_request_ > config_.relocalisation_interval &&
@@ -251,6 +255,7 @@ void Tracker::relocalise(const RelocalisationHint& hint) {
   frames_lost_ = 0;
   reference_id_ = hint.keyframe_id;
   last_.T_map_camera = hint.T_map_camera;
+  place_epoch_ = hint.map_epoch;
   last_.landmark_ids.assign(last_.landmark_ids.size(), 0);
 }
 
@@ -274,29 +279,37 @@ void Tracker::leave_map_for(const LocalMap& other) {
   give_up_pose();
   reference_id_ = other.keyframes.back().id;
   last_.T_map_camera = other.keyframes.back().T_map_camera;
+  place_epoch_ = other.map_epoch;
   last_.landmark_ids.assign(last_.landmark_ids.size(), 0);
 }
 
 bool Tracker::update_map(LocalMap map) {
   const bool foreign = map_.is_foreign(map);
   if (foreign) leave_map_for(map);
+  const bool had_map_of_place = has_map_of_place();
   follow_map(std::move(map));
+  if (!had_map_of_place && has_map_of_place()) frames_lost_ = 0;  // only now it can be found
   return !foreign;
 }
 
+bool Tracker::has_map_of_place() const {
+  return map_.map_epoch() >= place_epoch_ && map_.T_map_keyframe(reference_id_);
+}
+
 void Tracker::follow_map(LocalMap map) {
+  const bool is_of_old_map = map_.map_epoch() >= place_epoch_;
   const auto T_map_old = map_.T_map_keyframe(reference_id_);
   const auto old_keyframes = map_.keyframes();
   if (!map_.apply(std::move(map))) return;
   if (state_ == TrackingState::kWaiting) state_ = TrackingState::kLost;
+  if (!T_map_old || !is_of_old_map) return;  // a new place: the pose came with it
   const auto carry = [&](const SE3& T_old, const SE3& T_new) {
     last_.T_map_camera = T_new * T_old.inverse() * last_.T_map_camera;
   };
-  if (const auto T_map_new = map_.T_map_keyframe(reference_id_); T_map_new && T_map_old) {
+  if (const auto T_map_new = map_.T_map_keyframe(reference_id_); T_map_new) {
     carry(*T_map_old, *T_map_new);
     return;
   }
-  if (!T_map_old) return;  // a new place: the pose came with it
   // The reference was culled: along with the newest keyframe that is in both maps.
   for (auto old = old_keyframes.rbegin(); old != old_keyframes.rend(); ++old) {
     const auto T_map_new = map_.T_map_keyframe(old->id);

@@ -59,6 +59,44 @@ TEST_F(TrackerTest, AtAProposedPlaceThePoseTellsWhereToLook) {
   EXPECT_LT(error_m(at(2.1)), 0.05);
 }
 
+// Loop closing answers in the map that it has just corrected; tracking gets that map later.
+TEST_F(TrackerTest, AProposalInAMapThatIsYetToComeIsNotCorrectedAgain) {
+  start();
+  for (int i = 0; i <= 20; ++i) step(at(0.5 * i));
+  TunnelWorld elsewhere(99);
+  std::swap(world_, elsewhere);
+  ASSERT_TRUE(step(at(2.0)).relocalisation_request);
+  const SE3 T_new_old(SO3::exp({0.0, 0.0, 0.1}), {0.0, 5.0, 0.0});
+  const SE3 T_map_body = T_new_old * at(2.0);
+  tracker_->relocalise({frame_id_, 1, 1, T_map_body * TunnelWorld::T_body_camera()});
+  std::swap(world_, elsewhere);
+  for (int i = 0; i < 15; ++i) {
+    step(at(2.0));
+    ASSERT_EQ(result_.state, TrackingState::kRelocalising) << "the old map says nothing of it";
+  }
+  tracker_->update_map(corrected_map(T_new_old));
+  step_blind();
+  EXPECT_EQ(result_.state, TrackingState::kRelocalising);
+  EXPECT_LT(error_m(T_map_body), 1e-9);
+  step(at(2.0));
+  EXPECT_EQ(result_.state, TrackingState::kTracking);
+  EXPECT_EQ(result_.map_epoch, 1U);
+  EXPECT_LT(error_m(T_map_body), 0.05);
+}
+
+TEST_F(TrackerTest, AsksAgainIfTheMapOfAProposalDoesNotCome) {
+  start();
+  for (int i = 0; i <= 20; ++i) step(at(0.5 * i));
+  world_ = TunnelWorld(99);
+  ASSERT_TRUE(step(at(2.0)).relocalisation_request);
+  tracker_->relocalise({frame_id_, 1, 1, at(2.0) * TunnelWorld::T_body_camera()});
+  int frames = 0;
+  while (++frames < 100 && !step(at(2.0)).relocalisation_request) {
+  }
+  EXPECT_GT(frames, 20);
+  EXPECT_LT(frames, 100);
+}
+
 TEST_F(TrackerTest, AWrongPlaceIsNotTaken) {
   start();
   for (int i = 0; i <= 20; ++i) step(at(0.5 * i));

@@ -69,6 +69,7 @@ class Tracker {
   void lose(Frame& frame, FrameResult& result);
   void give_up_pose();
   void follow_map(LocalMap map);
+  [[nodiscard]] bool has_map_of_place() const;
   void leave_map_for(const LocalMap& other);
   void remember(const Frame& frame, const FrameMatcher& matcher, const geometry::SE3& T_map_camera);
   void choose_reference(double median_depth_m);
@@ -97,6 +98,7 @@ class Tracker {
   TrackedFrame last_;
   geometry::SE3 T_odom_camera_;
   KeyframeId reference_id_ = 0;
+  std::uint64_t place_epoch_ = 0;  ///< Of the map that the last pose, or the proposed one, is in.
   std::int64_t last_keyframe_stamp_ns_ = 0;
   int most_inliers_ = 0;  ///< Since the last keyframe.
 
