@@ -51,6 +51,7 @@ Tracker::Tracker(const TrackerConfig& config,
 
 FrameResult Tracker::track(Frame frame) {
   FrameResult result;
+  now_ns_ = frame.stamp_ns;
   result.frame_id = frame.frame_id;
   result.stamp_ns = frame.stamp_ns;
   result.statistics.features = static_cast<int>(frame.features.size());
@@ -88,6 +89,7 @@ FrameResult Tracker::track(Frame frame) {
 
 void Tracker::start_map(Frame& frame, const FrameMatcher& matcher, FrameResult& result) {
   state_ = TrackingState::kTracking;
+  map_stamp_ns_ = frame.stamp_ns;
   remember(frame, matcher, T_body_camera_);
   add_keyframe(frame, matcher, result);
   fill(result);
@@ -301,6 +303,7 @@ void Tracker::follow_map(LocalMap map) {
   const auto T_map_old = map_.T_map_keyframe(reference_id_);
   const auto old_keyframes = map_.keyframes();
   if (!map_.apply(std::move(map))) return;
+  map_stamp_ns_ = now_ns_;
   if (state_ == TrackingState::kWaiting) state_ = TrackingState::kLost;
   if (!T_map_old || !is_of_old_map) return;  // a new place: the pose came with it
   const auto carry = [&](const SE3& T_old, const SE3& T_new) {
@@ -370,6 +373,7 @@ bool Tracker::is_keyframe_due(const Frame& frame,
   cues.reference_inliers = most_inliers_;
   cues.pending_keyframes = static_cast<int>(map_.pending_count());
   cues.keyframes = static_cast<int>(map_.keyframes().size());
+  cues.since_map_s = static_cast<double>(frame.stamp_ns - map_stamp_ns_) * kNsToS;
   cues.since_last_s = static_cast<double>(frame.stamp_ns - last_keyframe_stamp_ns_) * kNsToS;
   cues.baseline_ratio = T_reference_camera.translation().norm() / median_depth_m;
   cues.rotation_rad = T_reference_camera.rotation().angle_rad();

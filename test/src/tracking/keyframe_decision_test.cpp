@@ -62,8 +62,27 @@ TEST(KeyframeDecisionTest, BusyMappingGetsOnlyWhatIsUrgent) {
   cues.since_last_s = 0.3;
   cues.inliers = 90;  // below a quarter
   EXPECT_TRUE(is_keyframe(cues, kConfig));
+}
+
+TEST(KeyframeDecisionTest, WithManyPendingOnlyAWeakFrame) {
+  KeyframeCues cues = due();
   cues.pending_keyframes = 3;
+  cues.since_last_s = 1.0;
   EXPECT_FALSE(is_keyframe(cues, kConfig));
+  cues.inliers = 90;  // below a quarter: the next frame may see nothing that is known
+  EXPECT_TRUE(is_keyframe(cues, kConfig));
+}
+
+TEST(KeyframeDecisionTest, WhereMappingIsAwayItIsNotWaitedFor) {
+  KeyframeCues cues = due();
+  cues.pending_keyframes = 30;
+  cues.since_last_s = 1.0;
+  cues.since_map_s = 1.9;
+  EXPECT_FALSE(is_keyframe(cues, kConfig));
+  cues.since_map_s = 2.0;
+  EXPECT_TRUE(is_keyframe(cues, kConfig));
+  cues.since_last_s = 0.3;
+  EXPECT_FALSE(is_keyframe(cues, kConfig)) << "no more of them than of a busy mapping";
 }
 
 TEST(KeyframeDecisionTest, NeverWithNextToNothing) {

@@ -39,6 +39,14 @@ class TrackerTest : public testing::Test {
     tracker_->update_map(map_->local_map(frame_id_));
     return result_;
   }
+  /// The next frame; no map comes.
+  const FrameResult& step_without_mapping(const SE3& T_world_body) {
+    ++frame_id_;
+    result_ = tracker_->track(
+        world_.see(T_world_body * TunnelWorld::T_body_camera(), frame_id_, now_ns_));
+    now_ns_ += kFrame_ns;
+    return result_;
+  }
   /// The founded map after a loop was closed: everything moves and turns.
   [[nodiscard]] LocalMap corrected_map(const SE3& T_new_old) const {
     LocalMap map = map_->local_map(frame_id_ + 1);

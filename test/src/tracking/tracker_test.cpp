@@ -206,6 +206,28 @@ TEST_F(TrackerTest, CorrectionsMoveTheMapNotOdometry) {
   EXPECT_NEAR(T_step_odom.translation().z(), 0.3, 0.03);
 }
 
+// Mapping is away: what tracking founds must do. Turns of 17 and 40 degrees a second, and a drive.
+// A single pose has up to 1 cm (see StandsStillForAMinute), and so has each keyframe against the
+// one before: 15 in a turn are 3.9 cm, of which three times as much is allowed.
+TEST_F(TrackerTest, GoesOnWithoutMapping) {
+  for (const double step_rad : {0.03, 0.07}) {
+    world_ = TunnelWorld();
+    start();
+    for (int i = 0; step_rad * i <= 2.0 * M_PI; ++i) {
+      step_without_mapping(at(0.0, step_rad * i));
+      ASSERT_EQ(result_.state, TrackingState::kTracking) << step_rad * i << " rad";
+      ASSERT_LT(error_m(at(0.0)), 0.12) << step_rad * i << " rad";
+    }
+  }
+  world_ = TunnelWorld();
+  start();
+  for (int i = 0; i <= 140; ++i) {
+    step_without_mapping(at(0.5 * i));
+    ASSERT_EQ(result_.state, TrackingState::kTracking) << 0.5 * i << " m";
+  }
+  EXPECT_LT(error_m(at(70.0)), 0.35) << "0.5 % of the way";
+}
+
 TEST_F(TrackerTest, LocalisationOnlyMakesNoKeyframes) {
   start();
   for (int i = 0; i <= 20; ++i) step(at(0.5 * i));

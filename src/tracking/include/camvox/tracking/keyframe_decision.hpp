@@ -18,7 +18,10 @@ struct KeyframeConfig {
   /// No keyframe before the camera has moved by this share of the median depth ...
   double min_baseline_ratio = 0.01;
   double min_rotation_deg = 2.0;  ///< ... or turned by that much.
-  int max_pending = 3;            ///< Keyframes that mapping has not yet taken in, at most.
+  /// Keyframes that mapping has not yet taken in. With so many only a weak frame becomes one, until
+  /// no map has come for max_silence_s: then mapping is away, and tracking must do without.
+  int max_pending = 3;
+  double max_silence_s = 2.0;
 
   template <typename Self, typename Visitor>
   static void visit(Self& self, Visitor&& field) {
@@ -33,6 +36,7 @@ struct KeyframeConfig {
     field("min_baseline_ratio", self.min_baseline_ratio, config::at_least(0.0));
     field("min_rotation_deg", self.min_rotation_deg, config::at_least(0.0));
     field("max_pending", self.max_pending, config::at_least(1));
+    field("max_silence_s", self.max_silence_s, config::greater_than(0.0));
   }
 };
 
@@ -45,6 +49,7 @@ struct KeyframeCues {
   int pending_keyframes = 0;  ///< That mapping has not yet taken in; 0: it is idle.
   int keyframes = 0;          ///< In the local map.
   double since_last_s = 0.0;
+  double since_map_s = 0.0;     ///< Since mapping's newest local map.
   double baseline_ratio = 0.0;  ///< Distance to the nearest keyframe over the median depth.
   double rotation_rad = 0.0;    ///< Angle to that keyframe.
 };

@@ -100,7 +100,9 @@ class Tracker {
   KeyframeId reference_id_ = 0;
   std::uint64_t place_epoch_ = 0;  ///< Of the map that the last pose, or the proposed one, is in.
   std::int64_t last_keyframe_stamp_ns_ = 0;
-  int most_inliers_ = 0;  ///< Since the last keyframe.
+  std::int64_t now_ns_ = 0;        ///< Stamp of the newest frame,
+  std::int64_t map_stamp_ns_ = 0;  ///< and of the one at which the newest map came.
+  int most_inliers_ = 0;           ///< Since the last keyframe.
 
   int frames_lost_ = 0;  ///< Since tracked, or since the last hint.
   std::optional<std::uint64_t> requested_frame_id_;
