@@ -98,6 +98,15 @@ bool is_set(const std::atomic<bool>* stop) {
   return stop != nullptr && stop->load(std::memory_order_relaxed);
 }
 
+/// Returns how many iterations it took.
+int run_round(BundleProblem& problem,
+              const BundleAdjustmentConfig& config,
+              int max_iterations,
+              const std::atomic<bool>* stop) {
+  if (max_iterations == 0 || is_set(stop)) return 0;
+  return internal::BundleSolver(problem, config).run(max_iterations, stop);
+}
+
 void count(const BundleProblem& problem, BundleSummary& summary) {
   for (const auto& pose : problem.poses) ++(pose.fixed ? summary.fixed_poses : summary.free_poses);
   summary.points = problem.points_world.size();
@@ -117,12 +126,11 @@ BundleSummary adjust(BundleProblem& problem,
   if (summary.free_poses == 0 || judged.empty()) return summary;
 
   const auto costs_before = costs_of(problem, judged, config);
-  internal::BundleSolver first(problem, config);
-  summary.iterations = first.run(config.first_iterations, stop);
-  gate(problem, judged, config);
-  if (!is_set(stop) && config.second_iterations > 0) {
-    internal::BundleSolver second(problem, config);
-    summary.iterations += second.run(config.second_iterations, stop);
+  summary.iterations = run_round(problem, config, config.first_iterations, stop);
+  // Poses that have yet to settle are no judges.
+  if (!is_set(stop)) {
+    gate(problem, judged, config);
+    summary.iterations += run_round(problem, config, config.second_iterations, stop);
     gate(problem, judged, config);
   }
   summary.cost_before = kept_cost(problem, judged, costs_before);

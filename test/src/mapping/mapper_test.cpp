@@ -215,10 +215,12 @@ TEST(MapperTest, InterruptedOrOutdatedBundlesAreSafe) {
   MappingWorld world;
   Mapper mapper({}, world.camera());
   for (int i = 0; i < 4; ++i) mapper.insert(world.look(MappingWorld::on_street(i), mapper));
+  const auto ties = mapper.map().keyframe(4).shared;
   auto job = mapper.local_job(4);
   const std::atomic<bool> stop = true;
   EXPECT_EQ(job.solve(&stop).status, optimization::BundleSummary::Status::kInterrupted);
   EXPECT_TRUE(mapper.finish(job));
+  EXPECT_EQ(mapper.map().keyframe(4).shared, ties) << "judged at poses that have yet to settle";
   auto outdated = mapper.local_job(4);
   (void)outdated.solve();
   LoopProposal proposal{mapper.epoch(), 4, 1, {{4, mapper.map().keyframe(4).frame.T_map_camera}}};

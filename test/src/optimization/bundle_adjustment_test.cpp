@@ -225,6 +225,7 @@ TEST(BundleAdjustmentTest, StopsWhenAsked) {
   const auto summary = adjust(world.problem, {}, &stop);
   EXPECT_EQ(summary.status, BundleSummary::Status::kInterrupted);
   EXPECT_EQ(summary.iterations, 0);
+  EXPECT_EQ(summary.outliers + summary.depth_outliers, 0U) << "where it starts says nothing";
   EXPECT_EQ(geometry::local(start, world.problem.poses.back().T_world_camera).norm(), 0.0);
 }
 

@@ -83,7 +83,8 @@ struct BundleSummary {
 /// a modern synthesis", 2000, section 6.1), pixels and depths with kernels of their own, so that a
 /// wrong depth costs only the depth. Two rounds; in between, and at the end, every observation that
 /// came in unflagged is judged against the gates. Fix at least one pose. `stop` may end it after
-/// any iteration. Same input, same bytes. Throws std::logic_error when an index is out of range.
+/// any iteration; in the first round, it ends without having judged. Same input, same bytes. Throws
+/// std::logic_error when an index is out of range.
 [[nodiscard]] BundleSummary adjust(BundleProblem& problem,
                                    const BundleAdjustmentConfig& config = {},
                                    const std::atomic<bool>* stop = nullptr);
