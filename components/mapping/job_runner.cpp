@@ -8,7 +8,24 @@
 
 namespace camvox::mapping_component {
 
-JobRunner::JobRunner(Done done) : done_(std::move(done)), thread_([this] { run(); }) {}
+namespace {
+
+SolvedJob solve(mapping::BundleJob job, const std::atomic<bool>& stop) {
+  SolvedJob solved{.job = std::move(job), .summary = {}, .time_s = 0.0, .error = nullptr};
+  const double started_s = thread_processor_time_s();
+  try {
+    solved.summary = solved.job.solve(&stop);
+  } catch (...) {
+    solved.error = std::current_exception();
+  }
+  solved.time_s = thread_processor_time_s() - started_s;
+  return solved;
+}
+
+}  // namespace
+
+JobRunner::JobRunner(std::function<void(SolvedJob)> done)
+    : done_(std::move(done)), thread_([this] { run(); }) {}
 
 JobRunner::~JobRunner() {
   interrupt();
@@ -21,7 +38,7 @@ JobRunner::~JobRunner() {
 }
 
 void JobRunner::start(mapping::BundleJob job) {
-  if (busy_.exchange(true)) throw std::logic_error("JobRunner: a job is under way");
+  if (std::exchange(busy_, true)) throw std::logic_error("JobRunner: a job is under way");
   interrupted_ = false;
   {
     const std::lock_guard lock(mutex_);
@@ -38,11 +55,7 @@ void JobRunner::run() {
     if (ending_) return;
     mapping::BundleJob job = *std::exchange(job_, std::nullopt);
     lock.unlock();
-    const double started_s = thread_processor_time_s();
-    const auto summary = job.solve(&interrupted_);
-    const double time_s = thread_processor_time_s() - started_s;
-    busy_ = false;  // before `done` tells, so that who is told may start the next
-    done_(std::move(job), summary, time_s);
+    done_(solve(std::move(job), interrupted_));
     lock.lock();
   }
 }

@@ -73,20 +73,18 @@ MappingComponent::MappingComponent(Context& context)
 void MappingComponent::start() {
   if (!config_.load_map.empty()) load();
   if (config_.lockstep) return;
-  runner_ = std::make_unique<mapping_component::JobRunner>(
-      [this](mapping::BundleJob job, optimization::BundleSummary summary, double time_s) {
-        context_.post([this, job = std::move(job), summary, time_s] {
-          const auto work = progress_.measure();
-          finish(job, summary, time_s);
-          publish_update(last_.header);
-          publish_local_map(last_);
-          start_next_job();
-        });
+  jobs_ = std::make_unique<mapping_component::JobSchedule>(
+      context_, mapper_, [this](const mapping_component::SolvedJob& solved) {
+        const auto work = progress_.measure();
+        const bool taken = finish(solved.job, solved.summary, solved.time_s);
+        publish_update(last_.header);
+        publish_local_map(last_);
+        return taken;
       });
 }
 
 void MappingComponent::stop() {
-  runner_.reset();
+  if (jobs_) jobs_->stop();
   if (config_.save_map && !save_changes()) throw std::runtime_error("the map was not saved");
 }
 
@@ -201,14 +199,15 @@ void MappingComponent::on_correction(const LoopCorrection& correction) {
                           proposal.match,
                           proposal.by_surfaces ? " by surfaces" : "",
                           mapper_.epoch());
-      full_due_ = config_.mapping.full_bundle_iterations > 0;
-      if (config_.lockstep && full_due_) {
-        adjust(mapper_.full_job());
-        full_due_ = false;
-      }
+      const bool full = config_.mapping.full_bundle_iterations > 0;
+      if (config_.lockstep && full) adjust(mapper_.full_job());
       publish_update(correction.header());
       publish_local_map(last_);
-      start_next_job();
+      if (jobs_) {
+        jobs_->interrupt();
+        if (full) jobs_->want_full();
+        jobs_->start_due();
+      }
     }
   }
   loop_answers_.insert(correction.header().frame_id());
@@ -250,7 +249,7 @@ void MappingComponent::follow(const Waiting& frame) {
   context_.log().info("no keyframe is missing any more: {} in the map, the newest is {}",
                       mapper_.map().keyframes().size(),
                       newest_keyframe_);
-  full_due_ = config_.mapping.full_bundle_iterations > 0;
+  if (jobs_ && config_.mapping.full_bundle_iterations > 0) jobs_->want_full();
   mapping_component::publish_changes(
       mapper_.all_changes(), mapper_.epoch(), frame.header, updates_);
 }
@@ -300,38 +299,25 @@ void MappingComponent::insert(const tracking::Keyframe& keyframe) {
     mapper_.cull_keyframes(keyframe.id);
     return;
   }
-  job_due_ = keyframe.id;
-  if (runner_ != nullptr) runner_->interrupt();
+  if (jobs_) jobs_->want_local(keyframe.id);
 }
 
 void MappingComponent::adjust(mapping::BundleJob job) {
   const double started_s = thread_processor_time_s();
   const auto summary = job.solve();
-  finish(job, summary, thread_processor_time_s() - started_s);
+  (void)finish(job, summary, thread_processor_time_s() - started_s);
 }
 
-void MappingComponent::finish(const mapping::BundleJob& job,
+bool MappingComponent::finish(const mapping::BundleJob& job,
                               const optimization::BundleSummary& summary,
                               double time_s) {
-  if (!mapper_.finish(job)) return;
+  if (!mapper_.finish(job)) return false;
   if (!config_.lockstep && job.newest != 0) mapper_.cull_keyframes(job.newest);
   const auto text = summary.to_string(time_s);
   context_.diagnostics().set(job.whole_map ? "full bundle adjustment" : "local bundle adjustment",
                              text);
   if (job.whole_map) context_.log().info("full bundle adjustment: {}", text);
-}
-
-/// Live: what is due goes to the thread, the newest keyframe first.
-void MappingComponent::start_next_job() {
-  if (runner_ == nullptr || runner_->busy()) return;  // when it is done, this is called again
-  if (job_due_ != 0) {
-    auto job = mapper_.local_job(std::exchange(job_due_, 0));
-    if (!job.empty()) return runner_->start(std::move(job));
-  }
-  if (std::exchange(full_due_, false)) {
-    auto job = mapper_.full_job();
-    if (!job.empty()) runner_->start(std::move(job));
-  }
+  return true;
 }
 
 void MappingComponent::answer(const Waiting& frame) {
@@ -339,7 +325,7 @@ void MappingComponent::answer(const Waiting& frame) {
   mapper_.set_reference(frame.reference_id);
   publish_update(frame.header);
   publish_local_map(frame);
-  start_next_job();
+  if (jobs_) jobs_->start_due();
   report();
   progress_.done(frame.header);
 }

@@ -92,6 +92,33 @@ BundleJob empty_job(const Map& map, const ObservationModel& model) {
   return job;
 }
 
+/// A job of the whole map also says where what it held is: local jobs may have moved that since.
+KeyframePoses new_poses(const Map& map, const BundleJob& job) {
+  KeyframePoses poses;
+  for (std::size_t i = 0; i < job.keyframes.size(); ++i) {
+    const auto* keyframe = map.find_keyframe(job.keyframes[i]);
+    if (keyframe == nullptr) continue;
+    const auto& pose = job.problem.poses[i];
+    const bool moved = pose.T_world_camera.matrix() != keyframe->frame.T_map_camera.matrix();
+    if (pose.fixed && !(job.whole_map && moved)) continue;
+    poses[job.keyframes[i]] = pose.T_world_camera;
+  }
+  return poses;
+}
+
+void forget_outliers(Map& map, const BundleJob& job) {
+  for (std::size_t i = 0; i < job.sightings.size(); ++i) {
+    const auto& seen = job.sightings[i];
+    if (!job.problem.observations[i].outlier) continue;
+    const LandmarkId id = job.landmarks[job.problem.observations[i].point];
+    const auto* keyframe = map.find_keyframe(seen.keyframe);
+    if (keyframe != nullptr && map.find_landmark(id) != nullptr &&
+        keyframe->frame.landmark_ids[seen.feature] == id) {
+      map.forget(id, seen.keyframe);
+    }
+  }
+}
+
 }  // namespace
 
 BundleJob make_local_job(const Map& map, const ObservationModel& model, KeyframeId id) {
@@ -145,13 +172,7 @@ BundleJob make_full_job(const Map& map,
 }
 
 std::set<KeyframeId> apply_job(Map& map, const ObservationModel& model, const BundleJob& job) {
-  KeyframePoses poses;
-  for (std::size_t i = 0; i < job.keyframes.size(); ++i) {
-    const bool there = map.find_keyframe(job.keyframes[i]) != nullptr;
-    if (!job.problem.poses[i].fixed && there) {
-      poses[job.keyframes[i]] = job.problem.poses[i].T_world_camera;
-    }
-  }
+  const auto poses = new_poses(map, job);
   std::map<LandmarkId, Eigen::Vector3d> placed;
   for (std::size_t i = 0; i < job.landmarks.size(); ++i) {
     const auto& p_map = job.problem.points_world[i];
@@ -162,16 +183,7 @@ std::set<KeyframeId> apply_job(Map& map, const ObservationModel& model, const Bu
   const auto follows = [&](KeyframeId id) { return id > job.newest; };
   const auto moved = move_keyframes(map, poses, follows, placed);
 
-  for (std::size_t i = 0; i < job.sightings.size(); ++i) {
-    const auto& seen = job.sightings[i];
-    if (!job.problem.observations[i].outlier) continue;
-    const LandmarkId id = job.landmarks[job.problem.observations[i].point];
-    const auto* keyframe = map.find_keyframe(seen.keyframe);
-    if (keyframe != nullptr && map.find_landmark(id) != nullptr &&
-        keyframe->frame.landmark_ids[seen.feature] == id) {
-      map.forget(id, seen.keyframe);
-    }
-  }
+  if (!job.keeps_outliers) forget_outliers(map, job);
   for (const auto id : job.landmarks) {
     if (map.find_landmark(id) != nullptr) refresh_landmark(map, model, id);
   }

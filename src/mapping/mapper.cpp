@@ -101,6 +101,7 @@ BundleJob Mapper::local_job(KeyframeId id) const {
   if (there == 0) return {};
   auto job = make_local_job(map_, model_, there);
   job.map_epoch = epoch_;
+  job.full_jobs = full_jobs_;
   return job;
 }
 
@@ -113,7 +114,9 @@ BundleJob Mapper::full_job() const {
 }
 
 bool Mapper::finish(const BundleJob& job) {
-  if (job.map_epoch != epoch_ || job.empty()) return false;
+  const bool outdated = !job.whole_map && job.full_jobs != full_jobs_;
+  if (job.map_epoch != epoch_ || outdated || job.empty()) return false;
+  if (job.whole_map) ++full_jobs_;
   const auto moved = apply_job(map_, model_, job);
   changed_.insert(moved.begin(), moved.end());
   return true;

@@ -246,6 +246,55 @@ TEST(MapperTest, BundleOfAnEarlierStateTakesLaterKeyframesAlong) {
   mapper.map().check_consistency();
 }
 
+// The whole map takes seconds, and local jobs go on beside it.
+TEST(MapperTest, FullBundleIsSolvedBesideLocalOnes) {
+  MappingWorld world;
+  Mapper mapper = drive(world, 10);
+  const KeyframeId end = mapper.map().keyframes().rbegin()->first;
+  const LoopProposal loop{
+      mapper.epoch(), end, 1, {{end, mapper.map().keyframe(end).frame.T_map_camera}}, true};
+  ASSERT_EQ(mapper.correct(loop), "");
+  const SE3 held = mapper.map().keyframe(end).frame.T_map_camera;
+  auto full = mapper.full_job();
+  for (int i = 10; i < 13; ++i) {
+    const auto keyframe = world.look(MappingWorld::on_street(i), mapper);
+    mapper.insert(keyframe);
+    auto local = mapper.local_job(keyframe.id);
+    (void)local.solve();
+    ASSERT_TRUE(mapper.finish(local));
+  }
+  EXPECT_NE(mapper.map().keyframe(end).frame.T_map_camera.matrix(), held.matrix());
+  auto cut_before = mapper.local_job(13);
+  (void)full.solve();
+  (void)cut_before.solve();
+  ASSERT_TRUE(mapper.finish(full));
+  EXPECT_EQ(mapper.map().keyframe(end).frame.T_map_camera.matrix(), held.matrix());
+  EXPECT_FALSE(mapper.finish(cut_before)) << "it would put back what the full one has moved";
+  mapper.map().check_consistency();
+  EXPECT_LT(worst_position_m(mapper, world), 0.03);
+}
+
+TEST(MapperTest, WhatDoesNotFitIsKeptWhereTheMapStrains) {
+  MappingWorld world({.pose_noise = 0.0});
+  Mapper mapper = drive(world, 6);
+  LoopProposal loop{mapper.epoch(), 6, 1, {}, true};
+  loop.poses[6] = SE3({}, {1.0, 0.0, 0.0}) * mapper.map().keyframe(6).frame.T_map_camera;
+  ASSERT_EQ(mapper.correct(loop), "");
+  const auto ties = mapper.map().keyframe(6).shared;
+  auto job = mapper.local_job(6);
+  job.config.first_iterations = 1;
+  job.config.second_iterations = 0;
+  job.keeps_outliers = true;
+  EXPECT_GT(job.solve().outliers, 0U);
+  ASSERT_TRUE(mapper.finish(job));
+  EXPECT_EQ(mapper.map().keyframe(6).shared, ties);
+  job = mapper.local_job(6);
+  job.config = {.first_iterations = 1, .second_iterations = 0, .pixel_gate = 0.1};
+  EXPECT_GT(job.solve().outliers, 0U);
+  ASSERT_TRUE(mapper.finish(job));
+  EXPECT_NE(mapper.map().keyframe(6).shared, ties);
+}
+
 // The far end of the street was mapped with 2 m of drift; the loop says where it really is.
 TEST(MapperTest, CorrectionMovesTheMapAndFusesTheDouble) {
   MappingWorld world({.pose_noise = 0.0});

@@ -12,7 +12,7 @@
 #include "camvox/interfaces/camvox_interfaces.hpp"
 #include "camvox/interfaces/std_srvs.hpp"
 #include "camvox/mapping/mapper.hpp"
-#include "camvox/mapping_component/job_runner.hpp"
+#include "camvox/mapping_component/job_schedule.hpp"
 #include "camvox/mapping_component/map_announcer.hpp"
 #include "camvox/sensors/camera_intrinsics.hpp"
 #include "camvox/tracking/frame_builder.hpp"
@@ -51,8 +51,8 @@ struct MappingComponentConfig {
 };
 
 /// Owns the map (see mapping::Mapper). Answers the pose of every frame with the local map around
-/// its reference keyframe, and tells what changed. Live, bundle adjustment runs on a thread of its
-/// own: a new keyframe interrupts it, and the map that it made is sent when it is there.
+/// its reference keyframe, and tells what changed. Live, bundle adjustment runs on threads of its
+/// own (see JobSchedule), and the map that it made is sent when it is there.
 ///
 /// A loaded map is announced to loop closing first, so that tracking (which has the parameter
 /// `load_map`, too) finds its place in it; keyframes that are not tied to it are refused, so that
@@ -102,10 +102,9 @@ class MappingComponent final : public Component {
   [[nodiscard]] std::string problem_with(const tracking::Keyframe& keyframe) const;
   void insert(const tracking::Keyframe& keyframe);
   void adjust(mapping::BundleJob job);
-  void finish(const mapping::BundleJob& job,
-              const optimization::BundleSummary& summary,
-              double time_s);
-  void start_next_job();
+  [[nodiscard]] bool finish(const mapping::BundleJob& job,
+                            const optimization::BundleSummary& summary,
+                            double time_s);
   void publish_local_map(const Waiting& frame);
   void publish_update(Header header);
   void report();
@@ -127,11 +126,9 @@ class MappingComponent final : public Component {
   std::size_t frames_behind_ = 0;    ///< Answered without their keyframe since the last one came.
   std::size_t inserted_behind_ = 0;  ///< Keyframes that came late, since behind_.
   bool behind_ = false;              ///< Keyframes are missing.
-  std::uint64_t job_due_ = 0;        ///< Keyframe whose surroundings are to be adjusted; 0: none.
-  bool full_due_ = false;            ///< The whole map is to be adjusted.
   std::uint64_t refused_ = 0;
   mapping_component::MapAnnouncer announcer_;
-  std::unique_ptr<mapping_component::JobRunner> runner_;
+  std::unique_ptr<mapping_component::JobSchedule> jobs_;  ///< Live only.
 };
 
 }  // namespace camvox

@@ -19,7 +19,9 @@ struct BundleJob {
   std::vector<Observation> sightings;  ///< Of problem.observations.
   KeyframeId newest = 0;               ///< Later keyframes move along with their parents.
   std::uint64_t map_epoch = 0;         ///< A job from before a correction is not applied.
+  std::uint64_t full_jobs = 0;         ///< Nor is a local one from before a full one.
   bool whole_map = false;
+  bool keeps_outliers = false;  ///< What does not fit is not forgotten.
 
   [[nodiscard]] bool empty() const { return problem.observations.empty(); }
   /// Solves it; `stop` ends it after any iteration.
@@ -39,7 +41,8 @@ struct BundleJob {
                                       const std::set<KeyframeId>& held = {});
 
 /// Writes a solved job into the map: poses, positions, and outliers out. What is gone from the map
-/// since is passed over. Returns the keyframes that moved.
+/// since is passed over; of the whole map, what was moved since is put where the job has it.
+/// Returns the keyframes that moved.
 std::set<KeyframeId> apply_job(Map& map, const ObservationModel& model, const BundleJob& job);
 
 }  // namespace camvox::mapping

@@ -74,7 +74,9 @@ class Mapper {
 
   [[nodiscard]] BundleJob local_job(KeyframeId id) const;
   [[nodiscard]] BundleJob full_job() const;
-  /// Brings in a solved job; false when a correction has made it void.
+  /// Brings in a solved job; false when a correction has made it void, or a full job that was
+  /// brought in while it was solved. A full job may be solved beside local ones: keyframes that
+  /// came since go with their parents.
   bool finish(const BundleJob& job);
 
   /// Drops redundant neighbours of a keyframe, but not the tracker's reference, nor the newest
@@ -114,6 +116,7 @@ class Mapper {
   ObservationModel model_;
   Map map_;
   std::uint64_t epoch_ = 0;
+  std::uint64_t full_jobs_ = 0;  ///< Brought in.
   KeyframeId tracker_reference_ = 0;
   std::set<KeyframeId> loop_ends_;  ///< Of loops by surfaces; some may have been culled since.
   std::set<KeyframeId> changed_;
