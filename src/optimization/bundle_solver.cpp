@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace camvox::optimization::internal {
 namespace {
@@ -38,6 +39,7 @@ BundleSolver::BundleSolver(BundleProblem& problem, const BundleAdjustmentConfig&
     : problem_(problem), config_(config) {
   number_free_poses();
   group_by_point();
+  group_by_pose();
   find_blocks();
 }
 
@@ -74,36 +76,46 @@ void BundleSolver::group_by_point() {
     link.observation = i;
     link.free_pose = free_index_[observation.pose];
   }
+  for (std::uint32_t i = 0; i < points_.size(); ++i) {
+    for (std::uint32_t k = points_[i].begin; k < points_[i].end; ++k) links_[k].point = i;
+  }
   step_points_.resize(points_.size());
 }
 
-void BundleSolver::find_blocks() {
-  const std::size_t free = free_poses_.size();
-  block_of_.assign(free * free, 0);
-  for (const auto& point : points_) {
-    for (std::uint32_t a = point.begin; a < point.end; ++a) {
-      if (links_[a].free_pose < 0) continue;
-      for (std::uint32_t b = point.begin; b < point.end; ++b) {
-        const auto row = static_cast<std::size_t>(links_[a].free_pose);
-        if (links_[b].free_pose < links_[a].free_pose) continue;
-        block_of_[row * free + static_cast<std::size_t>(links_[b].free_pose)] = 1;
-      }
-    }
+void BundleSolver::group_by_pose() {
+  pose_begin_.assign(free_poses_.size() + 1, 0);
+  for (const auto& link : links_) {
+    if (link.free_pose >= 0) ++pose_begin_[static_cast<std::size_t>(link.free_pose) + 1];
   }
-  for (std::size_t k = 0; k < block_of_.size(); ++k) {
-    if (block_of_[k] == 0) continue;
-    Block entry;
-    entry.row = static_cast<std::uint32_t>(k / free);
-    entry.column = static_cast<std::uint32_t>(k % free);
-    blocks_.push_back(entry);
-    block_of_[k] = static_cast<std::uint32_t>(blocks_.size());
+  for (std::size_t f = 1; f < pose_begin_.size(); ++f) pose_begin_[f] += pose_begin_[f - 1];
+  pose_links_.resize(pose_begin_.back());
+  auto next = pose_begin_;
+  for (std::uint32_t k = 0; k < links_.size(); ++k) {
+    if (links_[k].free_pose < 0) continue;
+    pose_links_[next[static_cast<std::size_t>(links_[k].free_pose)]++] = k;
   }
 }
 
-BundleSolver::Block& BundleSolver::block(std::int32_t row, std::int32_t column) {
-  const auto index =
-      static_cast<std::size_t>(row) * free_poses_.size() + static_cast<std::size_t>(column);
-  return blocks_[block_of_[index] - 1];
+void BundleSolver::find_blocks() {
+  constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
+  std::vector<std::uint32_t> noted_by(free_poses_.size(), kNone);
+  std::vector<std::uint32_t> columns;
+  for (std::uint32_t row = 0; row < free_poses_.size(); ++row) {
+    columns.clear();
+    for (std::uint32_t k = pose_begin_[row]; k < pose_begin_[row + 1]; ++k) {
+      const auto& point = points_[links_[pose_links_[k]].point];
+      for (std::uint32_t b = point.begin; b < point.end; ++b) {
+        if (links_[b].free_pose < static_cast<std::int32_t>(row)) continue;
+        const auto column = static_cast<std::uint32_t>(links_[b].free_pose);
+        if (std::exchange(noted_by[column], row) != row) columns.push_back(column);
+      }
+    }
+    std::sort(columns.begin(), columns.end());
+    row_begin_.push_back(static_cast<std::uint32_t>(blocks_.size()));
+    for (const auto column : columns) blocks_.emplace_back(Block{.row = row, .column = column});
+  }
+  row_begin_.push_back(static_cast<std::uint32_t>(blocks_.size()));
+  block_of_.resize(free_poses_.size());
 }
 
 double BundleSolver::cost() const {
@@ -157,29 +169,36 @@ void BundleSolver::linearize() {
 
 /// Eliminates the points: S = H_pp - H_pl H_ll^-1 H_lp, with Marquardt's damping of the diagonals.
 void BundleSolver::reduce(double lambda) {
-  for (auto& entry : blocks_) entry.S.setZero();
   g_reduced_.resize(6 * static_cast<Eigen::Index>(free_poses_.size()));
-  for (std::size_t f = 0; f < free_poses_.size(); ++f) {
-    const auto i = static_cast<std::int32_t>(f);
-    auto& S = block(i, i).S;
-    S = H_poses_[f];
-    S.diagonal() += lambda * H_poses_[f].diagonal() + Vector6d::Constant(1e-9);
-    g_reduced_.segment<6>(6 * static_cast<Eigen::Index>(f)) = g_poses_[f];
-  }
   for (auto& point : points_) {
     Eigen::Matrix3d H = point.H;
     H.diagonal() += lambda * point.H.diagonal() + Eigen::Vector3d::Constant(1e-9);
     point.H_inverse = H.inverse();
+  }
+  for (std::uint32_t row = 0; row < free_poses_.size(); ++row) reduce_row(row, lambda);
+}
+
+/// Row by row, so that a list as long as one row finds the blocks.
+void BundleSolver::reduce_row(std::uint32_t row, double lambda) {
+  for (std::uint32_t k = row_begin_[row]; k < row_begin_[row + 1]; ++k) {
+    block_of_[blocks_[k].column] = k;
+    blocks_[k].S.setZero();
+  }
+  auto& S = blocks_[block_of_[row]].S;
+  S = H_poses_[row];
+  S.diagonal() += lambda * H_poses_[row].diagonal() + Vector6d::Constant(1e-9);
+  auto g = g_reduced_.segment<6>(6 * static_cast<Eigen::Index>(row));
+  g = g_poses_[row];
+  for (std::uint32_t k = pose_begin_[row]; k < pose_begin_[row + 1]; ++k) {
+    const auto& link = links_[pose_links_[k]];
+    const auto& point = points_[link.point];
     const Eigen::Vector3d moved = point.H_inverse * point.g;
-    for (std::uint32_t a = point.begin; a < point.end; ++a) {
-      if (links_[a].free_pose < 0) continue;
-      g_reduced_.segment<6>(6 * links_[a].free_pose).noalias() -= links_[a].H_pose_point * moved;
-      const Eigen::Matrix<double, 6, 3> Y = links_[a].H_pose_point * point.H_inverse;
-      for (std::uint32_t b = point.begin; b < point.end; ++b) {
-        if (links_[b].free_pose < links_[a].free_pose) continue;
-        block(links_[a].free_pose, links_[b].free_pose).S.noalias() -=
-            Y * links_[b].H_pose_point.transpose();
-      }
+    g.noalias() -= link.H_pose_point * moved;
+    const Eigen::Matrix<double, 6, 3> Y = link.H_pose_point * point.H_inverse;
+    for (std::uint32_t b = point.begin; b < point.end; ++b) {
+      if (links_[b].free_pose < link.free_pose) continue;
+      blocks_[block_of_[static_cast<std::size_t>(links_[b].free_pose)]].S.noalias() -=
+          Y * links_[b].H_pose_point.transpose();
     }
   }
 }

@@ -31,6 +31,7 @@ class BundleSolver {
   struct Link {
     std::uint32_t observation = 0;
     std::int32_t free_pose = -1;  ///< -1: the pose is fixed.
+    std::uint32_t point = 0;      ///< Index in points_.
     Matrix63d H_pose_point = Matrix63d::Zero();
   };
   /// A point in use: links [begin, end) are its observations.
@@ -42,7 +43,7 @@ class BundleSolver {
     Eigen::Vector3d g = Eigen::Vector3d::Zero();  ///< Negative gradient.
     Eigen::Matrix3d H_inverse = Eigen::Matrix3d::Zero();
   };
-  /// A block above the diagonal of the reduced system.
+  /// A block on or above the diagonal of the reduced system.
   struct Block {
     std::uint32_t row = 0;
     std::uint32_t column = 0;
@@ -51,13 +52,14 @@ class BundleSolver {
 
   void number_free_poses();
   void group_by_point();
+  void group_by_pose();
   void find_blocks();
-  [[nodiscard]] Block& block(std::int32_t row, std::int32_t column);
 
   /// Half the robustified squared error; infinite when a point is behind a camera that sees it.
   [[nodiscard]] double cost() const;
   void linearize();
   void reduce(double lambda);
+  void reduce_row(std::uint32_t row, double lambda);
   [[nodiscard]] bool solve_poses();
   [[nodiscard]] bool solve_dense(Eigen::VectorXd& step) const;
   [[nodiscard]] bool solve_sparse(Eigen::VectorXd& step) const;
@@ -72,8 +74,11 @@ class BundleSolver {
   std::vector<std::uint32_t> free_poses_;
   std::vector<Link> links_;
   std::vector<Point> points_;
-  std::vector<Block> blocks_;
-  std::vector<std::uint32_t> block_of_;  ///< Row-major free x free; index into blocks_ plus one.
+  std::vector<std::uint32_t> pose_begin_;  ///< Links of free pose f: pose_links_[f..f + 1).
+  std::vector<std::uint32_t> pose_links_;  ///< Indices into links_, ascending for each pose.
+  std::vector<Block> blocks_;              ///< By row, then by column.
+  std::vector<std::uint32_t> row_begin_;   ///< Blocks of row f: [f..f + 1), the diagonal first.
+  std::vector<std::uint32_t> block_of_;    ///< By column, for one row at a time.
   std::vector<Matrix6d> H_poses_;
   std::vector<Vector6d> g_poses_;
   Eigen::VectorXd g_reduced_;
