@@ -319,21 +319,23 @@ void Map::check_consistency() const {
       }
     }
   }
-  std::size_t roots = 0;
   for (const auto& [id, keyframe] : keyframes_) {
     const auto& ids = keyframe.frame.landmark_ids;
     observations -= ids.size() - static_cast<std::size_t>(std::count(ids.begin(), ids.end(), 0U));
     demand(keyframe.shared == shared[id], "covisibility");
     demand(ids.size() == keyframe.frame.features.size(), "one landmark id per feature");
-    if (keyframe.parent == 0) ++roots;
-    if (keyframe.parent != 0) {
-      const auto* parent = find_keyframe(keyframe.parent);
-      demand(parent != nullptr && parent->children.contains(id), "parent does not know its child");
-      demand(is_below(id, keyframes_.begin()->first), "keyframe outside of the tree");
+    const bool root = id == keyframes_.begin()->first;
+    demand((keyframe.parent == 0) == root, "the oldest keyframe, and no other, is the root");
+    const auto* parent = find_keyframe(keyframe.parent);
+    demand(root || (parent != nullptr && parent->children.contains(id)),
+           "parent does not know its child");
+    for (const auto child : keyframe.children) {
+      const auto* there = find_keyframe(child);
+      demand(there != nullptr && there->parent == id, "child does not know its parent");
     }
   }
+  demand(parents_first().size() == keyframes_.size(), "keyframe outside of the tree");
   demand(observations == 0, "a keyframe sees a landmark that does not know it");
-  demand(roots <= 1, "more than one root");
 }
 
 }  // namespace camvox::mapping
