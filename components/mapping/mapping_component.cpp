@@ -167,11 +167,18 @@ void MappingComponent::on_resent_keyframe(const Keyframe& message) {
 
 void MappingComponent::on_pose(const FramePose& pose) {
   const auto work = progress_.measure();
-  // After a restart: a map of an earlier epoch would not be taken.
-  const bool is_new = mapper_.map().keyframes().empty();
-  if (is_new && pose.map_epoch() > mapper_.epoch()) mapper_.restore({}, pose.map_epoch());
+  if (pose.map_epoch() > mapper_.epoch()) take_over_epoch(pose);
   waiting_.push_back({pose.header(), pose.reference_keyframe_id()});
   answer_ready();
+}
+
+/// After a restart: a map of an earlier epoch would not be taken.
+void MappingComponent::take_over_epoch(const FramePose& pose) {
+  context_.log().info("map epoch {} taken over, it was {}", pose.map_epoch(), mapper_.epoch());
+  mapper_.raise_epoch(pose.map_epoch());
+  if (!announcer_.done()) return;  // its update, yet to come, will say it
+  mapping_component::publish_changes(
+      mapper_.all_changes(), mapper_.epoch(), pose.header(), updates_);
 }
 
 void MappingComponent::on_correction(const LoopCorrection& correction) {

@@ -381,6 +381,18 @@ TEST_F(LoadedMapTest, GoesOnWithTheNextId) {
   mapping.stop();
 }
 
+TEST_F(LoadedMapTest, TakesOverTheEpochAfterARestart) {
+  MappingComponent mapping(fake_);
+  mapping.start();
+  acknowledge_all();
+  send_pose(100, 3, 9);  // tracking has seen two corrections since
+  const auto map = conversion::read_local_map(*maps().back());
+  EXPECT_EQ(map.map_epoch, 9U) << "or tracking would not take it";
+  const auto update = fake_.published<MapUpdate>("map_update").back();
+  EXPECT_EQ(update->map_epoch(), 9U);
+  EXPECT_EQ(update->keyframe_ids_count(), 3U);
+}
+
 TEST_F(LoadedMapTest, GetsNoSecondMapBesideIt) {
   MappingComponent mapping(fake_);
   mapping.start();

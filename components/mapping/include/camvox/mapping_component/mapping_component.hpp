@@ -60,7 +60,8 @@ struct MappingComponentConfig {
 ///
 /// Keyframes come in without a gap. When some were lost (the link was cut) or all (this process was
 /// restarted), frames are answered with the map as it is; it says which keyframe is the next, and
-/// tracking sends what is missing once more, in order.
+/// tracking sends what is missing once more, in order. A restarted process, with a map loaded or
+/// without, takes over the epoch that tracking has seen.
 ///
 /// The service /camvox/save_map (std_srvs/srv/Trigger) saves the map as it is; it answers with the
 /// file, or with what is wrong.
@@ -87,6 +88,7 @@ class MappingComponent final : public Component {
   void on_keyframe(const Keyframe& message);
   void on_resent_keyframe(const Keyframe& message);
   void on_pose(const FramePose& pose);
+  void take_over_epoch(const FramePose& pose);
   void on_correction(const LoopCorrection& correction);
   void answer_ready();
   void insert_up_to(const Waiting& frame);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <set>
@@ -101,6 +102,10 @@ class Mapper {
   [[nodiscard]] const Map& map() const { return map_; }
   [[nodiscard]] std::uint64_t epoch() const { return epoch_; }
   [[nodiscard]] const ObservationModel& model() const { return model_; }
+
+  /// For a mapper that was restarted: the others have seen corrections that it has not, and take
+  /// nothing of an earlier epoch. The map stays.
+  void raise_epoch(std::uint64_t epoch) { epoch_ = std::max(epoch_, epoch); }
 
   /// Takes over a map that was loaded.
   void restore(Map map, std::uint64_t epoch);
