@@ -96,7 +96,7 @@ void MappingComponent::load() {
     context_.request_exit();  // nothing can be done without
     throw std::runtime_error(problem);
   }
-  mapper_.restore(std::move(loaded->map), loaded->epoch);
+  mapper_.restore(std::move(loaded->map), loaded->epoch, std::move(loaded->loop_ends));
   const auto& keyframes = mapper_.map().keyframes();
   newest_keyframe_ = keyframes.rbegin()->first;
   context_.log().info("{}: {} keyframes, {} landmarks, epoch {}",
@@ -119,7 +119,8 @@ std::string MappingComponent::nothing_to_save() const {
 std::string MappingComponent::save() {
   const auto& map = mapper_.map();
   const auto path = map_path(config_);
-  const auto status = mapping::save_map(path, map, mapper_.epoch(), mapper_.model().camera());
+  const auto status =
+      mapping::save_map(path, map, mapper_.epoch(), mapper_.model().camera(), mapper_.loop_ends());
   if (!status.ok()) {
     context_.log().error("{}", status.message());
     return status.message();

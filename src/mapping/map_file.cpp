@@ -90,7 +90,8 @@ Status write_landmarks(const Map& map, std::int64_t stamp_ns, Writer& writer) {
 Status write_map(const std::filesystem::path& path,
                  const Map& map,
                  std::uint64_t epoch,
-                 const tracking::TrackingCamera& camera) {
+                 const tracking::TrackingCamera& camera,
+                 const std::set<KeyframeId>& loop_ends) {
   Writer writer;
   if (auto status = writer.open(path); !status.ok()) return status;
   std::int64_t first_ns = 0, last_ns = 0;
@@ -107,6 +108,9 @@ Status write_map(const std::filesystem::path& path,
     if (!status.ok()) return status;
   }
   if (auto status = write_landmarks(map, last_ns, writer); !status.ok()) return status;
+  if (auto status = writer.write(map_file::kLoopEnds, last_ns, loop_ends); !status.ok()) {
+    return status;
+  }
   return writer.close();
 }
 
@@ -121,6 +125,7 @@ class Builder {
     if (header_.version == 0) return {StatusCode::kCorrupt, "the header is not the first message"};
     if (type == map_file::kKeyframe.type) return add_keyframe(message);
     if (type == map_file::kLandmarks.type) return add_landmarks(message);
+    if (type == map_file::kLoopEnds.type) return add_loop_ends(message);
     return {StatusCode::kCorrupt, "a message of type " + std::string(type) + " in a map"};
   }
 
@@ -144,10 +149,10 @@ class Builder {
     if (header_.version != 0) return {StatusCode::kCorrupt, "a second header"};
     auto header = map_file::decode_header(message);
     if (!header.ok()) return header.status();
-    if (header->version != kMapFileVersion) {
+    if (header->version < 1 || header->version > kMapFileVersion) {
       return {StatusCode::kUnsupported,
               "a map of version " + std::to_string(header->version) +
-                  "; this program reads version " + std::to_string(kMapFileVersion)};
+                  "; this program reads versions 1 to " + std::to_string(kMapFileVersion)};
     }
     header_ = *header;
     if (header_.keyframes > limits_.keyframes) {
@@ -223,6 +228,18 @@ class Builder {
     return {};
   }
 
+  Status add_loop_ends(storage::Bytes message) {
+    auto ends = map_file::decode_loop_ends(message);
+    if (!ends.ok()) return ends.status();
+    for (const auto id : *ends) {
+      if (loaded_.map.find_keyframe(id) != nullptr) continue;
+      return {StatusCode::kCorrupt,
+              "a loop ends at keyframe " + std::to_string(id) + ", not there"};
+    }
+    loaded_.loop_ends = std::move(*ends);
+    return {};
+  }
+
   Status add_landmark(const MapLandmark& saved) {
     auto& map = loaded_.map;
     const auto id = saved.landmark.id;
@@ -258,7 +275,8 @@ class Builder {
 
 bool is_ours(const storage::Schema& schema) {
   return std::ranges::any_of(
-      std::array{&map_file::kHeader, &map_file::kKeyframe, &map_file::kLandmarks},
+      std::array{
+          &map_file::kHeader, &map_file::kKeyframe, &map_file::kLandmarks, &map_file::kLoopEnds},
       [&schema](const MessageKind* kind) {
         return schema.name == kind->type && schema.encoding == kSchemaEncoding &&
                schema.data == kind->schema;
@@ -301,10 +319,11 @@ Result<LoadedMap> read_map(const storage::Source& source, Builder builder) {
 Status save_map(const std::filesystem::path& path,
                 const Map& map,
                 std::uint64_t epoch,
-                const tracking::TrackingCamera& camera) {
+                const tracking::TrackingCamera& camera,
+                const std::set<KeyframeId>& loop_ends) {
   auto aside = path;
   aside += ".part";
-  auto status = write_map(aside, map, epoch, camera);
+  auto status = write_map(aside, map, epoch, camera, loop_ends);
   std::error_code error;
   if (status.ok()) std::filesystem::rename(aside, path, error);
   if (status.ok() && !error) return {};

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <string>
 
+#include "camvox/mapping/map_file.hpp"
 #include "cdr_fields.hpp"
 
 namespace camvox::mapping::map_file {
@@ -192,6 +193,11 @@ const MessageKind kLandmarks{
     "uint64[] observation_keyframes\n"
     "uint32[] observation_features\n"};
 
+const MessageKind kLoopEnds{
+    "/map/loop_ends",
+    "camvox_map/msg/LoopEnds",
+    "uint64[] keyframe_ids     # which loops by surfaces have put where they are\n"};
+
 void encode(const Header& header, storage::ByteBuffer& out) {
   CdrWriter fields(out);
   const auto& camera = header.camera;
@@ -279,11 +285,15 @@ void encode(std::span<const MapLandmark* const> landmarks, storage::ByteBuffer& 
   fields.sequence(lists.observation_features);
 }
 
+void encode(const std::set<KeyframeId>& loop_ends, storage::ByteBuffer& out) {
+  CdrWriter(out).sequence(std::vector(loop_ends.begin(), loop_ends.end()));
+}
+
 storage::Result<Header> decode_header(storage::Bytes message) {
   CdrReader fields(message);
   Header header;
   header.version = fields.number<std::uint32_t>();
-  if (fields.ok() && header.version != 1) return header;
+  if (fields.ok() && (header.version < 1 || header.version > kMapFileVersion)) return header;
   auto& camera = header.camera;
   camera.width_px = static_cast<int>(fields.number<std::uint32_t>());
   camera.height_px = static_cast<int>(fields.number<std::uint32_t>());
@@ -370,6 +380,13 @@ storage::Result<std::vector<MapLandmark>> decode_landmarks(storage::Bytes messag
     if (auto problem = problem_with(landmarks[i]); !problem.ok()) return problem;
   }
   return landmarks;
+}
+
+storage::Result<std::set<KeyframeId>> decode_loop_ends(storage::Bytes message) {
+  CdrReader fields(message);
+  const auto ids = fields.sequence<std::uint64_t>();
+  if (!fields.complete()) return corrupt("loop ends: another length than it should be");
+  return std::set<KeyframeId>(ids.begin(), ids.end());
 }
 
 }  // namespace camvox::mapping::map_file

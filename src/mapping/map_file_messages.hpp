@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <set>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -21,6 +22,7 @@ struct MessageKind {
 extern const MessageKind kHeader;
 extern const MessageKind kKeyframe;
 extern const MessageKind kLandmarks;
+extern const MessageKind kLoopEnds;  ///< Since version 2.
 
 /// First message of a file.
 struct Header {
@@ -39,11 +41,13 @@ struct SavedKeyframe {
 void encode(const Header& header, storage::ByteBuffer& out);
 void encode(const MapKeyframe& keyframe, storage::ByteBuffer& out);
 void encode(std::span<const MapLandmark* const> landmarks, storage::ByteBuffer& out);
+void encode(const std::set<KeyframeId>& loop_ends, storage::ByteBuffer& out);
 
-/// A header of another version has only its version.
+/// A header of a version that is not known has only its version.
 storage::Result<Header> decode_header(storage::Bytes message);
 storage::Result<SavedKeyframe> decode_keyframe(storage::Bytes message);
 /// Every landmark has an observation, by keyframes in ascending order.
 storage::Result<std::vector<MapLandmark>> decode_landmarks(storage::Bytes message);
+storage::Result<std::set<KeyframeId>> decode_loop_ends(storage::Bytes message);
 
 }  // namespace camvox::mapping::map_file

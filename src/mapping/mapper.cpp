@@ -106,11 +106,16 @@ BundleJob Mapper::local_job(KeyframeId id) const {
 }
 
 BundleJob Mapper::full_job() const {
-  std::set<KeyframeId> held;
-  for (const auto id : loop_ends_) held.insert(map_.anchor(id).keyframe);
-  auto job = make_full_job(map_, model_, held);
+  auto job = make_full_job(map_, model_, loop_ends());
   job.map_epoch = epoch_;
   return job;
+}
+
+std::set<KeyframeId> Mapper::loop_ends() const {
+  std::set<KeyframeId> there;
+  for (const auto id : loop_ends_) there.insert(map_.anchor(id).keyframe);
+  there.erase(0);  // gone for too long
+  return there;
 }
 
 bool Mapper::finish(const BundleJob& job) {
@@ -234,11 +239,11 @@ MapChanges Mapper::all_changes() const {
   return changes;
 }
 
-void Mapper::restore(Map map, std::uint64_t epoch) {
+void Mapper::restore(Map map, std::uint64_t epoch, std::set<KeyframeId> loop_ends) {
   map_ = std::move(map);
   epoch_ = epoch;
   tracker_reference_ = 0;
-  loop_ends_.clear();
+  loop_ends_ = std::move(loop_ends);
   changed_.clear();
   removed_.clear();
   changed_edges_.clear();

@@ -2,14 +2,17 @@
 
 #include <gtest/gtest.h>
 #include <malloc.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <cstring>
+#include <filesystem>
 #include <memory>
 #include <numeric>
 #include <string>
 #include <vector>
 
+#include "camvox/mapping/map_file.hpp"
 #include "mapping_world.hpp"
 
 namespace camvox::mapping {
@@ -343,7 +346,8 @@ TEST(MapperTest, CorrectionMovesTheMapAndFusesTheDouble) {
   EXPECT_LT(worst_position_m(mapper, world), 0.02);
 }
 
-// Nothing but the correction ties the ends: left free, the landmarks between them would undo it.
+// Nothing but the correction ties the ends: left free, the landmarks between them would undo it,
+// also after the map was saved and loaded.
 TEST(MapperTest, ALoopBySurfacesStaysClosed) {
   MappingWorld world;
   Mapper mapper = drive(world, 12);
@@ -362,6 +366,14 @@ TEST(MapperTest, ALoopBySurfacesStaysClosed) {
   const SE3 end = pose(last);
   const KeyframeId middle = std::next(mapper.map().keyframes().begin(), 3)->first;
   const SE3 between = pose(middle);
+  const auto file =
+      std::filesystem::path(testing::TempDir()) / ("mapper_" + std::to_string(getpid()) + ".mcap");
+  ASSERT_TRUE(
+      save_map(file, mapper.map(), mapper.epoch(), world.camera(), mapper.loop_ends()).ok());
+  auto loaded = load_map(file, world.camera());
+  std::filesystem::remove(file);
+  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+  mapper.restore(std::move(loaded->map), loaded->epoch, std::move(loaded->loop_ends));
   auto job = mapper.full_job();
   EXPECT_EQ(job.solve().fixed_poses, 2U);
   ASSERT_TRUE(mapper.finish(job));

@@ -107,8 +107,11 @@ class Mapper {
   /// nothing of an earlier epoch. The map stays.
   void raise_epoch(std::uint64_t epoch) { epoch_ = std::max(epoch_, epoch); }
 
+  /// Keyframes that loops by surfaces have put where they are.
+  [[nodiscard]] std::set<KeyframeId> loop_ends() const;
+
   /// Takes over a map that was loaded.
-  void restore(Map map, std::uint64_t epoch);
+  void restore(Map map, std::uint64_t epoch, std::set<KeyframeId> loop_ends);
 
  private:
   [[nodiscard]] std::string problem_with(const tracking::Keyframe& keyframe) const;
