@@ -1,6 +1,7 @@
 #include "camvox/mapping/bundle_job.hpp"
 
 #include <algorithm>
+#include <unordered_map>
 
 #include "camvox/mapping/keyframes.hpp"
 #include "camvox/mapping/landmarks.hpp"
@@ -13,7 +14,8 @@ std::vector<LandmarkId> shared_landmarks(const Map& map,
                                          const std::vector<KeyframeId>& keyframes,
                                          std::size_t limit) {
   std::vector<std::pair<std::size_t, LandmarkId>> ranked;
-  for (const auto id : landmarks_seen_by(map, keyframes)) {
+  const bool all = keyframes.size() == map.keyframes().size();
+  for (const auto id : all ? map.landmark_ids() : landmarks_seen_by(map, keyframes)) {
     const std::size_t count = map.landmark(id).observations.size();
     if (count >= 2) ranked.emplace_back(count, id);
   }
@@ -60,21 +62,31 @@ void add_landmarks(BundleJob& job,
                    const Map& map,
                    const ObservationModel& model,
                    const std::vector<LandmarkId>& landmarks) {
-  std::map<KeyframeId, std::uint32_t> pose_of;
-  for (std::uint32_t i = 0; i < job.keyframes.size(); ++i) pose_of[job.keyframes[i]] = i;
+  // Of a large map there are a million observations: each is looked up once.
+  struct Source {
+    std::uint32_t pose;
+    const features::FrameFeatures* features;
+  };
+  std::unordered_map<KeyframeId, Source> source_of;
+  for (std::uint32_t i = 0; i < job.keyframes.size(); ++i) {
+    source_of[job.keyframes[i]] = {i, &map.keyframe(job.keyframes[i]).frame.features};
+  }
+  std::size_t observations = 0;
+  for (const auto id : landmarks) observations += map.landmark(id).observations.size();
+  job.sightings.reserve(observations);
+  job.problem.observations.reserve(observations);
   for (const auto id : landmarks) {
     const auto& landmark = map.landmark(id);
     const auto point = static_cast<std::uint32_t>(job.landmarks.size());
     const std::size_t before = job.sightings.size();
     for (const auto& seen : landmark.observations) {
-      const auto pose = pose_of.find(seen.keyframe);
-      if (pose == pose_of.end()) continue;
+      const auto source = source_of.find(seen.keyframe);
+      if (source == source_of.end()) continue;
       job.sightings.push_back(seen);
       optimization::BundleObservation observation;
-      observation.pose = pose->second;
+      observation.pose = source->second.pose;
       observation.point = point;
-      observation.observation =
-          model.observation(map.keyframe(seen.keyframe).frame.features, seen.feature);
+      observation.observation = model.observation(*source->second.features, seen.feature);
       job.problem.observations.push_back(observation);
     }
     if (job.sightings.size() == before) continue;
@@ -177,7 +189,7 @@ std::set<KeyframeId> apply_job(Map& map, const ObservationModel& model, const Bu
   for (std::size_t i = 0; i < job.landmarks.size(); ++i) {
     const auto& p_map = job.problem.points_world[i];
     if (map.find_landmark(job.landmarks[i]) != nullptr && p_map.allFinite()) {
-      placed[job.landmarks[i]] = p_map;
+      placed.emplace_hint(placed.end(), job.landmarks[i], p_map);
     }
   }
   const auto follows = [&](KeyframeId id) { return id > job.newest; };
