@@ -5,7 +5,19 @@ namespace camvox::tracking_component {
 namespace msg = camvox_interfaces::msg;
 
 void FrameQueue::add(const Sample<msg::FrameImage>& image) {
-  if (auto* inputs = slot(image->header().frame_id())) inputs->image = image;
+  const auto& header = image->header();
+  if (header.frame_id() <= last_taken_ && header.stamp_ns() > last_stamp_ns_) begin_ids_anew();
+  if (auto* inputs = slot(header.frame_id())) {
+    inputs->image = image;
+  } else {
+    ++dropped_;
+  }
+}
+
+/// No late image can be newer than what was taken: sync was started anew, and counts from 1 again.
+void FrameQueue::begin_ids_anew() {
+  while (!frames_.empty()) drop_oldest();
+  last_taken_ = 0;
 }
 
 void FrameQueue::add(const Sample<msg::DepthImage>& depth) {
@@ -59,6 +71,7 @@ FrameInputs FrameQueue::take(std::uint64_t frame_id) {
   FrameInputs inputs = std::move(frames_.begin()->second);
   frames_.erase(frames_.begin());
   last_taken_ = frame_id;
+  if (inputs.image) last_stamp_ns_ = (*inputs.image)->header().stamp_ns();
   return inputs;
 }
 

@@ -145,6 +145,7 @@ bool TrackingComponent::may_process() const {
 void TrackingComponent::process(const FrameInputs& inputs) {
   const double started_s = thread_processor_time_s();
   const auto header = (*inputs.image)->header();
+  if (header.frame_id() <= last_frame_id_) begin_ids_anew();
   auto frame = make_frame(inputs);
   const auto R_previous_camera = frame.R_previous_camera;
   auto result = tracker_.track(std::move(frame));
@@ -153,6 +154,15 @@ void TrackingComponent::process(const FrameInputs& inputs) {
   health_.add(result, R_previous_camera);
   report(result);
   progress_.done(header);
+}
+
+/// What is remembered by the ids of before would be taken for the future.
+void TrackingComponent::begin_ids_anew() {
+  context_.log().warn("frames count from 1 again: sync was started anew");
+  last_frame_id_ = 0;
+  map_frame_id_ = 0;
+  rotations_ = {};
+  tracker_.begin_ids_anew();
 }
 
 tracking::Frame TrackingComponent::make_frame(const FrameInputs& inputs) {

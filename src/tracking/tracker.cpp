@@ -265,6 +265,11 @@ void Tracker::relocalisation_failed(std::uint64_t frame_id) {
   if (requested_frame_id_ == frame_id) requested_frame_id_.reset();
 }
 
+void Tracker::begin_ids_anew() {
+  map_.forget_frame_id();
+  requested_frame_id_.reset();
+}
+
 void Tracker::give_up_pose() {
   state_ = TrackingState::kLost;
   motion_.reset();

@@ -54,7 +54,7 @@ class TrackingComponentTest : public testing::Test {
 
   void fill_header(msg::MessageHeader& header, std::uint64_t frame_id) {
     header.frame_id(frame_id);
-    header.stamp_ns(static_cast<std::int64_t>(frame_id) * kFrame_ns);
+    header.stamp_ns(static_cast<std::int64_t>(frame_id) * kFrame_ns + stamps_begin_ns_);
   }
   void send_image(std::uint64_t frame_id, int shift_px, bool black = false) {
     fake_.send<msg::FrameImage>("frame_image", [&](msg::FrameImage& image) {
@@ -106,6 +106,7 @@ class TrackingComponentTest : public testing::Test {
   }
 
   FakeContext fake_{"tracking"};
+  std::int64_t stamps_begin_ns_ = 0;
   std::vector<std::uint8_t> wall_;
   std::unique_ptr<TrackingComponent> component_;
 };
@@ -184,6 +185,38 @@ TEST_F(TrackingComponentTest, LiveTheNewestFrameCounts) {
   EXPECT_EQ(poses().back()->header().frame_id(), 3U);
   send_depth(2);  // too late
   EXPECT_EQ(poses().back()->header().frame_id(), 3U);
+  send_image(2, 4);
+  send(4, 12);
+  EXPECT_EQ(poses().back()->header().frame_id(), 4U);
+  EXPECT_EQ(fake_.diagnostics().status().values["dropped frames"], "1") << "the late image";
+}
+
+// Sync was started anew: its ids begin at 1 again, but time has gone on.
+TEST_F(TrackingComponentTest, FollowsFramesThatCountFromOneAgain) {
+  start();
+  for (std::uint64_t k = 1; k <= 4; ++k) send(k, 4 * static_cast<int>(k - 1));
+  send_local_map(4);
+  stamps_begin_ns_ = 4 * kFrame_ns;
+  for (std::uint64_t k = 1; k <= 3; ++k) {
+    send_image(k, 4 * static_cast<int>(k + 3));
+    send_depth(k);
+  }
+  ASSERT_EQ(poses().size(), 7U);
+  EXPECT_EQ(poses()[6]->header().frame_id(), 3U);
+  EXPECT_EQ(poses()[6]->state(), msg::TRACKING_OK);
+  // 24 px * 5 m / 250 px
+  EXPECT_LT((p_map_body(*poses()[6]) - Eigen::Vector3d(0.0, -0.48, 0.0)).norm(), 0.01);
+  // Maps count by the new ids as well: this one is taken, and shows no landmark.
+  fake_.send<msg::LocalMap>("local_map", [&](msg::LocalMap& map) {
+    fill_header(map.header(), 3);
+    map.keyframe_ids()[0] = 1;
+    map.keyframe_poses()[0] = conversion::to_array(geometry::SE3());
+    map.keyframe_ids_count(1);
+    map.keyframe_poses_count(1);
+    map.next_keyframe_id(1000);
+  });
+  send(4, 28);
+  EXPECT_EQ(poses().back()->state(), msg::TRACKING_LOST);
 }
 
 TEST_F(TrackingComponentTest, WhatMappingLacksIsSentAgain) {

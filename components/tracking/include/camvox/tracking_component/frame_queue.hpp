@@ -16,7 +16,8 @@ struct FrameInputs {
   std::optional<Sample<camvox_interfaces::msg::Cloud>> cloud;
 };
 
-/// Collects the inputs of frames by their id and hands them out in order.
+/// Collects the inputs of frames by their id and hands them out in order. An image whose id goes
+/// back while its stamp goes on begins a new sequence of ids.
 class FrameQueue {
  public:
   /// At most so many frames are held; the oldest goes when one more comes.
@@ -31,7 +32,8 @@ class FrameQueue {
   /// Id of the next frame to work on, if there is one: the oldest, once it is complete (keep_all);
   /// else the newest complete one, after older ones that lack nothing but their depth.
   [[nodiscard]] std::optional<std::uint64_t> next() const;
-  /// Takes a frame out. Older ones are dropped: without an image silently, the others counted.
+  /// Takes a frame out. Older ones are dropped: without an image silently, the others counted,
+  /// as are images that come too late.
   [[nodiscard]] FrameInputs take(std::uint64_t frame_id);
 
   [[nodiscard]] std::uint64_t dropped() const { return dropped_; }
@@ -40,11 +42,13 @@ class FrameQueue {
   [[nodiscard]] FrameInputs* slot(std::uint64_t frame_id);
   [[nodiscard]] bool complete(const FrameInputs& inputs) const;
   void drop_oldest();
+  void begin_ids_anew();
 
   bool needs_cloud_;
   bool keep_all_;
   std::map<std::uint64_t, FrameInputs> frames_;
   std::uint64_t last_taken_ = 0;
+  std::int64_t last_stamp_ns_ = 0;  ///< Of the image last taken.
   std::uint64_t dropped_ = 0;
 };
 

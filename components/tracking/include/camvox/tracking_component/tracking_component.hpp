@@ -77,6 +77,7 @@ class TrackingComponent final : public Component {
   void process_ready();
   [[nodiscard]] bool may_process() const;
   void process(const FrameInputs& inputs);
+  void begin_ids_anew();
   [[nodiscard]] tracking::Frame make_frame(const FrameInputs& inputs);
   void publish(tracking::FrameResult& result, double time_s);
   void publish_keyframe(const tracking::Keyframe& keyframe,

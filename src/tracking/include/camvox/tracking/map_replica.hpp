@@ -29,6 +29,8 @@ class MapReplica {
   /// Adds a keyframe just made, and the landmarks that it founded.
   void add(const Keyframe& keyframe);
   void clear();
+  /// Frames count from 1 again: the next map is not older than the present one.
+  void forget_frame_id() { frame_id_ = 0; }
 
   /// By ascending id.
   [[nodiscard]] const std::vector<Landmark>& landmarks() const { return landmarks_; }

@@ -41,6 +41,9 @@ class Tracker {
   void relocalise(const RelocalisationHint& hint);
   void relocalisation_failed(std::uint64_t frame_id);
 
+  /// The next frames' ids begin at 1 again; their stamps go on.
+  void begin_ids_anew();
+
   [[nodiscard]] TrackingState state() const { return state_; }
   [[nodiscard]] const MapReplica& map() const { return map_; }
 
