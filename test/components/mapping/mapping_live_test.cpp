@@ -38,7 +38,12 @@ class MappingLiveTest : public testing::Test {
 
   [[nodiscard]] const mapping::Map& map() const { return mapping_->mapper().map(); }
   void drive_to(double z_m) {
-    const auto keyframe = world_.look(MappingWorld::on_street(z_m), mapping_->mapper());
+    auto keyframe = world_.look(MappingWorld::on_street(z_m), mapping_->mapper());
+    // Tracking knows where it is in the map as that is, bent or not.
+    if (keyframe.parent_id != 0) {
+      keyframe.T_parent_camera =
+          world_.T_map_camera()[keyframe.parent_id - 1].inverse() * MappingWorld::on_street(z_m);
+    }
     fake_.send<Keyframe>("keyframe", [&](Keyframe& message) {
       ASSERT_TRUE(conversion::write_keyframe(keyframe, message));
     });
