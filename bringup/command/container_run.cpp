@@ -59,6 +59,7 @@ int run_container(CheckedConfig checked,
   container->start();
   guard.wait();
   log->info("stops");
+  guard.extend(kStopPatience + save_timeout);  // results may be under way already
   int code = final_state(container->components());
   const auto hung = container->stop(
       kStopTimeout, [&guard, save_timeout] { guard.extend(kStopPatience + save_timeout); });

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <utility>
 #include <vector>
 
 namespace camvox::bringup {
@@ -45,6 +46,11 @@ double to_seconds(std::chrono::nanoseconds time) {
   return std::chrono::duration<double>(time).count();
 }
 
+template <typename Future>
+bool runs(const Future& work) {
+  return work.valid() && work.wait_for(0s) != std::future_status::ready;
+}
+
 }  // namespace
 
 ComponentSlot::ComponentSlot(std::uint64_t id,
@@ -61,11 +67,11 @@ ComponentSlot::ComponentSlot(std::uint64_t id,
 }
 
 void ComponentSlot::construct() {
+  constructed_ = {};
   try {
     try_construct();
   } catch (...) {
-    failures_->add(std::current_exception());
-    failures_->pending = true;  // there is nothing that `ignore` could carry on with
+    failures_->fail(std::current_exception());
   }
 }
 
@@ -74,32 +80,44 @@ void ComponentSlot::try_construct() {
     executor_ = config_.executor.empty() ? environment_.executors.make(config_.name)
                                          : environment_.executors.shared(config_.executor);
   }
-  factory_ = environment_.plugins->factory(config_.plugin);
-  context_ = std::make_unique<dds::ComponentContext>(
+  auto parts = std::make_shared<Parts>();
+  parts->factory = environment_.plugins->factory(config_.plugin);
+  parts->context = std::make_unique<dds::ComponentContext>(
       settings_of(config_),
       environment_.middleware,
       executor_,
       log_,
       [failures = failures_](const std::exception_ptr& error) { failures->add(error); });
-  context_->on_exit_request([failures = failures_] { failures->exit_requested = true; });
+  parts->context->on_exit_request([failures = failures_] { failures->exit_requested = true; });
   {
     const std::lock_guard lock(failures_->mutex);
-    failures_->tenant = context_->tenant();
+    failures_->tenant = parts->context->tenant();
   }
-  component_ = factory_->create(*context_);
+  parts_ = std::move(parts);
+  constructed_ = std::async(std::launch::async, [parts = parts_.get(), failures = failures_] {
+                   try {
+                     parts->component = parts->factory->create(*parts->context);
+                   } catch (...) {
+                     failures->fail(std::current_exception());
+                   }
+                 }).share();
 }
 
+bool ComponentSlot::is_under_construction() const { return runs(constructed_); }
+
+bool ComponentSlot::saves() const { return runs(saved_); }
+
 void ComponentSlot::launch() {
-  if (component_ == nullptr) return;
+  if (!constructed_.valid() || is_under_construction()) return;
+  constructed_ = {};
+  if (parts_->component == nullptr) return;
   state_ = ComponentState::kRunning;
   launched_at_ = Clock::now();
-  started_ = std::make_shared<std::atomic<bool>>(false);
-  executor_->post(context_->tenant(),
-                  [component = component_.get(), context = context_.get(), started = started_] {
-                    component->start();
-                    *started = true;
-                    context->activate();  // after start(), so that no message comes before it
-                  });
+  executor_->post(parts_->context->tenant(), [parts = parts_.get()] {
+    parts->component->start();
+    parts->started = true;
+    parts->context->activate();  // after start(), so that no message comes before it
+  });
 }
 
 void ComponentSlot::Failures::add(const std::exception_ptr& error) {
@@ -116,18 +134,24 @@ void ComponentSlot::Failures::add(const std::exception_ptr& error) {
   pending = true;  // the rest is done in tick(), on another thread
 }
 
+void ComponentSlot::Failures::fail(const std::exception_ptr& error) {
+  add(error);
+  pending = true;
+}
+
 bool ComponentSlot::is_idle() const {
-  return context_ == nullptr || context_->tenant()->busy_time().count() == 0;
+  return parts_ == nullptr || parts_->context->tenant()->busy_time().count() == 0;
 }
 
 void ComponentSlot::tick(Clock::time_point now) {
+  if (is_under_construction()) return;
+  launch();
   // Not before the callback that asked is over: if it failed, the exit code must say so.
   const bool exits = failures_->exit_requested && is_idle();
   if (failures_->pending.exchange(false)) handle_failure(now);
-  if (state_ == ComponentState::kRestarting && now >= restart_at_) {
+  if (state_ == ComponentState::kRestarting && now >= restart_at_ && !saves()) {
     ++restarts_;
     construct();
-    launch();
   }
   if (state_ == ComponentState::kRunning) watch(now);
   if (exits && failures_->exit_requested.exchange(false) && environment_.exit_request) {
@@ -137,11 +161,9 @@ void ComponentSlot::tick(Clock::time_point now) {
 
 void ComponentSlot::handle_failure(Clock::time_point now) {
   const bool was_running = state_ == ComponentState::kRunning;
-  if (!end(now + kFailedTearDown)) return;
-  if (config_.on_error != "restart") {
-    state_ = ComponentState::kStopped;
-    return;
-  }
+  if (!halt(now + kFailedTearDown)) return;
+  save();
+  if (config_.on_error != "restart") return;
   const bool first = back_off_ == 0ms || (was_running && now - launched_at_ > kHealthyAfter);
   back_off_ = first ? kFirstBackOff : std::min(2 * back_off_, kLongestBackOff);
   restart_at_ = now + back_off_;
@@ -150,7 +172,7 @@ void ComponentSlot::handle_failure(Clock::time_point now) {
 
 void ComponentSlot::watch(Clock::time_point) {
   if (config_.watchdog_s <= 0.0) return;
-  const double busy_s = to_seconds(context_->tenant()->busy_time());
+  const double busy_s = to_seconds(parts_->context->tenant()->busy_time());
   if (busy_s <= config_.watchdog_s) {
     if (hang_reported_) log_->warn("the overdue callback has returned");
     hang_reported_ = false;
@@ -162,57 +184,71 @@ void ComponentSlot::watch(Clock::time_point) {
 }
 
 void ComponentSlot::close() {
-  if (context_ != nullptr) context_->tenant()->close();
+  if (parts_ != nullptr) parts_->context->tenant()->close();
 }
 
 bool ComponentSlot::halt(Clock::time_point deadline) {
   if (state_ == ComponentState::kHung) return false;
-  if (context_ == nullptr) return true;
+  if (parts_ == nullptr) return true;
+  if (constructed_.valid() && constructed_.wait_until(deadline) != std::future_status::ready) {
+    log_->error("hangs: its constructor does not return");
+    abandon();
+    return false;
+  }
   const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now());
-  if (context_->deactivate(std::max(left, 0ms))) return true;
+  if (parts_->context->deactivate(std::max(left, 0ms))) return true;
+  log_->error("hangs: a callback has been running for {:.1f} s and does not return",
+              to_seconds(parts_->context->tenant()->busy_time()));
   abandon();
   return false;
 }
 
-bool ComponentSlot::finish() {
-  bool saved = true;
-  if (component_ != nullptr && started_ != nullptr && *started_) {
-    try {
-      component_->stop();
-    } catch (...) {
-      saved = false;
-      log_->error("while stopping: {}", describe(std::current_exception()));
-    }
-  }
-  started_.reset();
-  component_.reset();
-  context_.reset();
-  factory_.reset();
+std::shared_future<bool> ComponentSlot::save() {
   state_ = ComponentState::kStopped;
-  return saved;
+  constructed_ = {};
+  if (parts_ == nullptr && saved_.valid()) return saved_;
+  saved_ = std::async(std::launch::async,
+                      [parts = std::exchange(parts_, nullptr), log = log_]() mutable {
+                        const bool saved = parts == nullptr || parts->stop(*log);
+                        parts.reset();
+                        return saved;
+                      })
+               .share();
+  return saved_;
+}
+
+/// False: the component could not save its results.
+bool ComponentSlot::Parts::stop(Logger& log) const {
+  if (!started) return true;
+  try {
+    component->stop();
+  } catch (...) {
+    log.error("while stopping: {}", describe(std::current_exception()));
+    return false;
+  }
+  return true;
 }
 
 void ComponentSlot::abandon() {
   state_ = ComponentState::kHung;
-  log_->error("hangs: a callback has been running for {:.1f} s and does not return",
-              to_seconds(context_->tenant()->busy_time()));
-  keep_for_ever(std::shared_ptr<Component>(std::move(component_)));
-  keep_for_ever(std::shared_ptr<dds::ComponentContext>(std::move(context_)));
+  keep_for_ever(std::make_shared<std::shared_future<void>>(std::exchange(constructed_, {})));
+  keep_for_ever(std::exchange(parts_, nullptr));
   keep_for_ever(executor_);
-  keep_for_ever(factory_);
   keep_for_ever(environment_.plugins);
 }
 
-std::vector<Problem> ComponentSlot::change_parameters(const ParameterMap& changes) {
-  if (state_ != ComponentState::kRunning)
-    return {{{config_.name, 0}, "", "the component does not run"}};
-  auto problems = context_->change_parameters(changes);
-  if (!problems.empty()) return problems;
+std::future<std::vector<Problem>> ComponentSlot::request_change(const ParameterMap& changes) {
+  if (state_ == ComponentState::kRunning) return parts_->context->request_change(changes);
+  std::promise<std::vector<Problem>> answer;
+  answer.set_value({{{config_.name, 0}, "", "the component does not run"}});
+  return answer.get_future();
+}
+
+void ComponentSlot::keep_parameters(const ParameterMap& changes) {
   for (const auto& [key, parameter] : changes) {
-    config_.parameters[key] = parameter;  // a restart keeps it
+    config_.parameters[key] = parameter;
     probed_.effective_parameters[key] = parameter;
   }
-  return {};
 }
 
 ComponentInfo ComponentSlot::info() const {
@@ -234,8 +270,11 @@ ComponentInfo ComponentSlot::info() const {
 Diagnostics::Status ComponentSlot::health() {
   const ComponentInfo now = info();
   Diagnostics::Status status;
-  if (context_ != nullptr) status = context_->diagnostics().status();
-  if (now.state == ComponentState::kHung) {
+  if (parts_ != nullptr) status = parts_->context->diagnostics().status();
+  if (constructed_.valid()) {
+    status.level = HealthLevel::kWarn;
+    status.message = "is being constructed";
+  } else if (now.state == ComponentState::kHung) {
     status.level = HealthLevel::kError;
     status.message = "hangs: a callback does not return";
   } else if (now.state == ComponentState::kStopped) {
@@ -247,7 +286,7 @@ Diagnostics::Status ComponentSlot::health() {
   } else if (now.overdue) {
     status.level = HealthLevel::kError;
     status.message = fmt::format("a callback has been running for {:.1f} s",
-                                 to_seconds(context_->tenant()->busy_time()));
+                                 to_seconds(parts_->context->tenant()->busy_time()));
   } else if (now.errors > reported_failures_ && status.level == HealthLevel::kOk) {
     status.level = HealthLevel::kWarn;
     status.message = "error: " + now.last_error;
@@ -256,8 +295,8 @@ Diagnostics::Status ComponentSlot::health() {
   status.values["state"] = to_string(now.state);
   status.values["errors"] = std::to_string(now.errors);
   status.values["restarts"] = std::to_string(now.restarts);
-  if (context_ == nullptr) return status;
-  for (const auto& [topic, stats] : context_->subscription_stats()) {
+  if (parts_ == nullptr) return status;
+  for (const auto& [topic, stats] : parts_->context->subscription_stats()) {
     status.values[topic + " received"] = std::to_string(stats.received);
     status.values[topic + " lost"] = std::to_string(stats.lost);
     status.values[topic + " rejected"] = std::to_string(stats.rejected);

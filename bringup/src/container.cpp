@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <future>
 #include <mutex>
 #include <stdexcept>
 
@@ -20,6 +21,7 @@ using Clock = std::chrono::steady_clock;
 constexpr auto kTickPeriod = 50ms;  // how soon failures, restarts and hangs are seen to
 constexpr auto kUnloadTimeout = 1000ms;
 constexpr auto kControlTimeout = 300ms;
+constexpr auto kParameterTimeout = 5s;
 
 dds::ParticipantOptions participant_options(const ContainerConfig& config) {
   const auto& transports = config.transports;
@@ -49,6 +51,24 @@ std::string join(const std::vector<Problem>& problems) {
   return config::ConfigError(problems).what();
 }
 
+template <typename Future>
+void wait_for(const Future& work) {
+  if (work.valid()) work.wait();
+}
+
+std::vector<Problem> answer_of(const std::string& component,
+                               std::future<std::vector<Problem>> answer) {
+  if (answer.wait_for(kParameterTimeout) != std::future_status::ready) {
+    return {
+        {{component, 0}, "", "the component did not answer; a callback of it is still running"}};
+  }
+  try {
+    return answer.get();
+  } catch (const std::future_error&) {
+    return {{{component, 0}, "", "the component ended before it answered"}};
+  }
+}
+
 }  // namespace
 
 ContainerConfig with_ros_environment(ContainerConfig config) {
@@ -72,12 +92,16 @@ struct Container::Implementation {
 
   void start(Container& self);
   void start_control(Container& self);
+  [[nodiscard]] bool end_control(std::chrono::milliseconds timeout);
   ComponentSlot& add(const ComponentConfig& component, ProbedComponent found);
   std::vector<std::string> end_components(Clock::time_point deadline,
                                           const std::function<void()>& before_saving);
   void tick();
   std::vector<Problem> problems_of(const ComponentConfig& component, const ProbedComponent& found);
+  std::vector<Problem> set_parameters(const std::string& name, const ParameterMap& changes);
+  ParameterMap parameters_of(const std::string& name);
   ComponentSlot* find(std::uint64_t id);
+  ComponentSlot* find(const std::string& name);
   void doing(std::string what) {
     const std::lock_guard lock(activity_mutex);
     activity = std::move(what);
@@ -87,7 +111,7 @@ struct Container::Implementation {
   ProbedSystem probed;
   Environment environment;
   std::shared_ptr<Logger> log;
-  mutable std::mutex mutex;  // guards the slots
+  mutable std::mutex mutex;  // guards the slots; never held while a component's code runs
   std::vector<std::unique_ptr<ComponentSlot>> slots;
   std::uint64_t last_id = 0;
   bool running = false;
@@ -111,7 +135,9 @@ void Container::Implementation::start(Container& self) {
   environment.middleware = dds::make_middleware(options, topic_settings(config), *log);
   environment.middleware.all_idle = environment.executors.idle_query();
   for (std::size_t i = 0; i < config.components.size(); ++i) {
-    add(config.components[i], probed.components.at(i)).construct();
+    auto& slot = add(config.components[i], probed.components.at(i));
+    slot.construct();
+    wait_for(slot.constructed());
   }
   start_control(self);
   for (const auto& slot : slots) slot->launch();
@@ -138,20 +164,8 @@ void Container::Implementation::start_control(Container& self) {
       config.container.name,
       environment.middleware.participant,
       control_executor,
-      [this](const std::string& name, const ParameterMap& changes) {
-        const std::lock_guard lock(mutex);
-        for (const auto& slot : slots) {
-          if (slot->config().name == name) return slot->change_parameters(changes);
-        }
-        return std::vector<Problem>{{{name, 0}, "", "there is no such component"}};
-      },
-      [this](const std::string& name) {
-        const std::lock_guard lock(mutex);
-        for (const auto& slot : slots) {
-          if (slot->config().name == name) return slot->probed().effective_parameters;
-        }
-        return ParameterMap{};
-      });
+      [this](const auto& name, const auto& changes) { return set_parameters(name, changes); },
+      [this](const auto& name) { return parameters_of(name); });
   for (const auto& slot : slots) services->add_component(slot->config().name);
   control->every(kTickPeriod, [this] { tick(); });
   const auto period = std::chrono::duration<double>(config.container.diagnostics_period_s);
@@ -164,6 +178,13 @@ void Container::Implementation::start_control(Container& self) {
   control->activate();
 }
 
+/// No new work for the control thread. False: it is still busy with some.
+bool Container::Implementation::end_control(std::chrono::milliseconds timeout) {
+  const bool control_ended = control == nullptr || control->deactivate(timeout);
+  const bool services_ended = services == nullptr || services->end(timeout);
+  return control_ended && services_ended;
+}
+
 ComponentSlot& Container::Implementation::add(const ComponentConfig& component,
                                               ProbedComponent found) {
   doing("constructing component '" + component.name + "'");
@@ -174,7 +195,30 @@ ComponentSlot& Container::Implementation::add(const ComponentConfig& component,
 
 void Container::Implementation::tick() {
   const std::lock_guard lock(mutex);
+  if (!running) return;
   for (const auto& slot : slots) slot->tick(Clock::now());
+}
+
+std::vector<Problem> Container::Implementation::set_parameters(const std::string& name,
+                                                               const ParameterMap& changes) {
+  std::future<std::vector<Problem>> answer;
+  {
+    const std::lock_guard lock(mutex);
+    auto* slot = find(name);
+    if (slot == nullptr) return {{{name, 0}, "", "there is no such component"}};
+    answer = slot->request_change(changes);
+  }
+  auto problems = answer_of(name, std::move(answer));  // without the lock: it may be busy for long
+  if (!problems.empty()) return problems;
+  const std::lock_guard lock(mutex);
+  if (auto* slot = find(name)) slot->keep_parameters(changes);
+  return {};
+}
+
+ParameterMap Container::Implementation::parameters_of(const std::string& name) {
+  const std::lock_guard lock(mutex);
+  const auto* slot = find(name);
+  return slot == nullptr ? ParameterMap{} : slot->probed().effective_parameters;
 }
 
 std::vector<std::string> Container::Implementation::end_components(
@@ -189,7 +233,7 @@ std::vector<std::string> Container::Implementation::end_components(
   for (const auto& slot : slots) {  // a hung one does not keep the others from saving
     if (std::find(hung.begin(), hung.end(), slot->config().name) != hung.end()) continue;
     doing("saving results of component '" + slot->config().name + "'");
-    all_saved = slot->finish() && all_saved;
+    all_saved = slot->save().get() && all_saved;
   }
   return hung;
 }
@@ -197,6 +241,13 @@ std::vector<std::string> Container::Implementation::end_components(
 ComponentSlot* Container::Implementation::find(std::uint64_t id) {
   const auto found = std::find_if(
       slots.begin(), slots.end(), [id](const auto& slot) { return slot->info().id == id; });
+  return found == slots.end() ? nullptr : found->get();
+}
+
+ComponentSlot* Container::Implementation::find(const std::string& name) {
+  const auto found = std::find_if(slots.begin(), slots.end(), [&name](const auto& slot) {
+    return slot->config().name == name;
+  });
   return found == slots.end() ? nullptr : found->get();
 }
 
@@ -249,14 +300,16 @@ std::vector<std::string> Container::stop(std::chrono::milliseconds timeout,
                                          const std::function<void()>& before_saving) {
   auto& self = *implementation_;
   const auto deadline = Clock::now() + timeout;
-  self.doing("ending the container's own services");
-  std::vector<std::string> hung;
-  const bool control_ended = self.control == nullptr || self.control->deactivate(kControlTimeout);
-  const bool services_ended = self.services == nullptr || self.services->end(kControlTimeout);
-  if (!control_ended || !services_ended) return {self.config.container.name};
-  const std::lock_guard lock(self.mutex);
-  hung = self.end_components(deadline, before_saving);
+  std::unique_lock lock(self.mutex);
+  self.running = false;
+  // Whatever the control thread is at: the components' results come first.
+  (void)self.end_control(0ms);
+  const auto hung = self.end_components(deadline, before_saving);
   if (!hung.empty()) return hung;  // their threads live on: nothing more can be taken down
+  lock.unlock();                   // which the control thread may need to come to an end
+  self.doing("ending the container's own services");
+  if (!self.end_control(kControlTimeout)) return {self.config.container.name};
+  lock.lock();
   self.doing("leaving the domain");
   self.slots.clear();
   self.services.reset();
@@ -265,7 +318,6 @@ std::vector<std::string> Container::stop(std::chrono::milliseconds timeout,
   self.control_executor.reset();
   self.environment.executors.clear();
   self.environment.middleware = {};
-  self.running = false;
   return {};
 }
 
@@ -277,29 +329,42 @@ ComponentInfo Container::load(const ComponentConfig& given) {
   if (give_shared_parameters(self.config.shared_parameters, found, component)) {
     found = probe_component(component, *factory);
   }
-  const std::lock_guard lock(self.mutex);
+  std::unique_lock lock(self.mutex);
   if (!self.running) throw std::runtime_error("the container does not run");
   if (const auto problems = self.problems_of(component, found); !problems.empty()) {
     throw std::runtime_error(join(problems));
   }
-  auto& slot = self.add(component, found);
-  slot.construct();
-  slot.launch();
+  auto& added = self.add(component, found);
+  const auto id = added.info().id;
+  added.construct();
+  const auto constructed = added.constructed();
+  lock.unlock();
+  wait_for(constructed);
+  lock.lock();
+  auto* slot = self.find(id);
+  if (!self.running || slot == nullptr) throw std::runtime_error("ended while it was loaded");
+  slot->launch();
   self.services->add_component(component.name);
   self.doing("running");
-  return slot.info();
+  return slot->info();
 }
 
 void Container::unload(std::uint64_t id) {
   auto& self = *implementation_;
-  const std::lock_guard lock(self.mutex);
+  std::unique_lock lock(self.mutex);
   auto* slot = self.find(id);
   if (slot == nullptr)
     throw std::runtime_error(fmt::format("No node found with unique_id: {}", id));
-  if (!slot->end(Clock::now() + kUnloadTimeout)) {
+  if (!slot->halt(Clock::now() + kUnloadTimeout)) {
     throw std::runtime_error("component '" + slot->config().name +
                              "' hangs and cannot be unloaded");
   }
+  const auto saved = slot->save();
+  lock.unlock();
+  saved.wait();
+  lock.lock();
+  slot = self.find(id);
+  if (!self.running || slot == nullptr) return;  // stop() takes it down
   self.services->remove_component(slot->config().name);
   std::erase_if(self.slots, [slot](const auto& candidate) { return candidate.get() == slot; });
 }

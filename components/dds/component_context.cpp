@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <future>
 
 #include "camvox/component/raw_message.hpp"
 #include "gateway.hpp"
@@ -15,7 +14,6 @@ namespace camvox::dds {
 namespace {
 
 constexpr std::chrono::milliseconds kTearDownTimeout{1000};
-constexpr std::chrono::seconds kParameterTimeout{5};
 
 /// Gives the middleware's threads a logger that lives as long as they do.
 class ForwardingLogger final : public Logger {
@@ -160,15 +158,17 @@ config::ParameterMap ComponentContext::effective_parameters() const {
   return effective_;
 }
 
-std::vector<config::Problem> ComponentContext::change_parameters(
+std::future<std::vector<config::Problem>> ComponentContext::request_change(
     const config::ParameterMap& changes) {
-  if (!change_handler_) {
-    return {{{name(), 0},
-             changes.empty() ? "" : changes.begin()->first,
-             "parameters of this component are fixed after start; change the config and restart"}};
-  }
   auto done = std::make_shared<std::promise<std::vector<config::Problem>>>();
-  auto problems = done->get_future();
+  auto answer = done->get_future();
+  if (!change_handler_) {
+    done->set_value(
+        {{{name(), 0},
+          changes.empty() ? "" : changes.begin()->first,
+          "parameters of this component are fixed after start; change the config and restart"}});
+    return answer;
+  }
   executor_->post(tenant_, [this, done, changes] {
     auto found = change_handler_(changes);
     {
@@ -179,10 +179,7 @@ std::vector<config::Problem> ComponentContext::change_parameters(
     }
     done->set_value(std::move(found));
   });
-  if (problems.wait_for(kParameterTimeout) != std::future_status::ready) {
-    return {{{name(), 0}, "", "the component did not answer; a callback of it is still running"}};
-  }
-  return problems.get();
+  return answer;
 }
 
 std::vector<PortStats> ComponentContext::subscription_stats() const {

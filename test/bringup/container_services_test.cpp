@@ -1,3 +1,7 @@
+#include <chrono>
+#include <filesystem>
+#include <future>
+
 #include "camvox/bringup/parameter_messages.hpp"
 #include "camvox/dds/service.hpp"
 #include "camvox/interfaces/composition_interfaces.hpp"
@@ -156,6 +160,36 @@ TEST_F(ContainerServicesTest, FixedParametersSaySo) {
       call<ListParameters_Request, ListParameters_Response>("/fixed/list_parameters", request);
   EXPECT_THAT(below.result().names(), ElementsAre("ransac.iterations"));
   EXPECT_THAT(below.result().prefixes(), ElementsAre("ransac"));
+}
+
+TEST_F(ContainerServicesTest, ChangeThatWaitsForABusyComponentKeepsNobodyFromSaving) {
+  const auto file = std::filesystem::path(::testing::TempDir()) / "results";
+  std::filesystem::remove(file);
+  start(
+      "container: {name: rig}\ncomponents:\n"
+      "  - {plugin: test::Ticker, name: busy, watchdog_s: 0.2, parameters: {hang_s: 8.0}}\n"
+      "  - {plugin: test::Saver, name: results, parameters: {output_dir: " +
+      ::testing::TempDir() + "}}\n");
+  ASSERT_TRUE(test::wait_until([&] { return component("busy").overdue; }));
+  EXPECT_EQ(get("/busy", "hang_s"), config::Value(8.0)) << "from here on services are found fast";
+  const auto change = std::async(std::launch::async, [this] {
+    SetParameters_Request request;
+    request.parameters({parameter("hang_s", 0.0)});
+    SetParameters_Response response;
+    (void)dds::call(
+        participant_, "/busy/set_parameters", request, response, std::chrono::seconds(7));
+  });
+  // While it waits, no other request is answered.
+  ASSERT_TRUE(test::wait_until([this] {
+    GetParameters_Response response;
+    return !dds::call(participant_,
+                      "/busy/get_parameters",
+                      GetParameters_Request(),
+                      response,
+                      std::chrono::milliseconds(800));
+  }));
+  EXPECT_THAT(container_->stop(std::chrono::seconds(20)), IsEmpty());
+  EXPECT_TRUE(std::filesystem::exists(file));
 }
 
 TEST_F(ContainerServicesTest, ParametersSetAtRunTimeOutliveARestart) {

@@ -90,29 +90,46 @@ struct SaverConfig {
   std::string output_dir;
   double save_s = 0.0;  ///< How long saving takes.
   bool fail = false;
+  double fail_after_s = 0.0;     ///< When a callback throws; 0: never.
+  bool hang_once_saved = false;  ///< The constructor does not return if there is a file already.
 
   template <typename Self, typename Visitor>
   static void visit(Self& self, Visitor&& field) {
     field("output_dir", self.output_dir);
     field("save_s", self.save_s);
     field("fail", self.fail);
+    field("fail_after_s", self.fail_after_s, camvox::config::at_least(0.0));
+    field("hang_once_saved", self.hang_once_saved);
   }
 };
 
 /// Writes "<output_dir>/<name>" when it ends.
 class Saver : public camvox::Component {
  public:
-  explicit Saver(Context& context)
-      : name_(context.name()), config_(context.parameters<SaverConfig>()) {}
+  explicit Saver(Context& context) : context_(context), config_(context.parameters<SaverConfig>()) {
+    if (config_.hang_once_saved && std::filesystem::exists(file())) {
+      context.log().info("hangs in its constructor");
+      std::this_thread::sleep_for(std::chrono::minutes(10));
+    }
+    if (config_.fail_after_s == 0.0) return;
+    context.every(std::chrono::duration_cast<std::chrono::nanoseconds>(
+                      std::chrono::duration<double>(config_.fail_after_s)),
+                  [] { throw std::runtime_error("failed"); });
+  }
 
   void stop() override {
     if (config_.fail) throw std::runtime_error("disk full");
+    context_.log().info("saves");
     std::this_thread::sleep_for(std::chrono::duration<double>(config_.save_s));
-    std::ofstream(std::filesystem::path(config_.output_dir) / name_) << "saved";
+    std::ofstream(file()) << "saved";
   }
 
  private:
-  std::string name_;
+  [[nodiscard]] std::filesystem::path file() const {
+    return std::filesystem::path(config_.output_dir) / context_.name();
+  }
+
+  Context& context_;
   SaverConfig config_;
 };
 

@@ -61,7 +61,8 @@ class Container {
   /// Ends all components and leaves the domain. Returns the names of components that hang; the
   /// process must then end without destructors (std::_Exit), because their threads live on.
   /// `timeout` is for callbacks to return; then `before_saving` is called, and each component
-  /// saves its results, however long that takes.
+  /// saves its results, however long that takes. The container's own name is among them if its
+  /// services hang; the components have saved by then.
   std::vector<std::string> stop(std::chrono::milliseconds timeout = std::chrono::milliseconds(1500),
                                 const std::function<void()>& before_saving = {});
 

@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <functional>
+#include <future>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -83,9 +84,10 @@ class ComponentContext final : public Context {
   [[nodiscard]] const std::shared_ptr<Tenant>& tenant() const { return tenant_; }
   [[nodiscard]] config::ParameterMap effective_parameters() const;
   [[nodiscard]] bool parameters_can_change() const { return change_handler_ != nullptr; }
-  /// Checks and applies changed parameters on the component's thread. Returns what is wrong; then
-  /// nothing was changed.
-  [[nodiscard]] std::vector<config::Problem> change_parameters(const config::ParameterMap& changes);
+  /// Checks and applies changed parameters on the component's thread. The answer is what is wrong;
+  /// then nothing was changed. A component that ends before it answers breaks the promise.
+  [[nodiscard]] std::future<std::vector<config::Problem>> request_change(
+      const config::ParameterMap& changes);
   [[nodiscard]] std::vector<PortStats> subscription_stats() const;
 
   [[nodiscard]] const std::string& name() const override { return settings_.name; }
