@@ -1,10 +1,12 @@
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <atomic>
 #include <deque>
 #include <future>
 #include <mutex>
 #include <thread>
+#include <vector>
 
 #include "camvox/interfaces/camvox_interfaces.hpp"
 #include "camvox/test/deadline.hpp"
@@ -83,13 +85,18 @@ TEST(SlowReader, StuckInItsCallbackHoldsUpNeitherWriterNorOthers) {
       kPort, [stuck = release.get_future().share()](const Sample<Cloud>&) { stuck.wait(); });
   container.component("free").subscribe<Cloud>(kPort, [&](const Sample<Cloud>&) { ++others; });
   container.activate();
-  const auto start = std::chrono::steady_clock::now();
+  std::vector<std::chrono::nanoseconds> took;
   for (int i = 1; i <= kSent; ++i) {
+    const auto start = std::chrono::steady_clock::now();
     publish(publisher, static_cast<std::uint64_t>(i));
+    took.push_back(std::chrono::steady_clock::now() - start);
     ASSERT_TRUE(wait_until([&] { return others == i; }));
   }
-  EXPECT_LT(std::chrono::steady_clock::now() - start, settings.max_blocking * kSent)
-      << "every publish waited for the stuck reader";
+  // A writer that waits for the stuck reader does so in each publish once its queue is full: for
+  // max_blocking, or for the 100 ms that are DDS's default. Other jobs of the machine hold up some
+  // publishes, not half of them.
+  std::ranges::nth_element(took, took.begin() + kSent / 2);
+  EXPECT_LT(took[kSent / 2], 50ms) << "publishing waits for the stuck reader";
   release.set_value();
 }
 
