@@ -182,7 +182,13 @@ std::future<std::vector<config::Problem>> ComponentContext::request_change(
   return answer;
 }
 
+void ComponentContext::keep(const std::string& topic, Subscription subscription) {
+  const std::lock_guard lock(subscriptions_mutex_);
+  subscriptions_.emplace_back(topic, std::move(subscription));
+}
+
 std::vector<PortStats> ComponentContext::subscription_stats() const {
+  const std::lock_guard lock(subscriptions_mutex_);
   std::vector<PortStats> all;
   for (const auto& [topic, subscription] : subscriptions_) {
     all.push_back({topic, subscription->stats()});
@@ -216,7 +222,8 @@ Subscription ComponentContext::make_subscription(const Port& port,
   auto subscription =
       std::make_shared<PlainSubscription>(middleware_.participant, topic, type, options);
   const bool shared = settings_of(topic).interprocess_zero_copy;
-  subscriptions_.emplace_back(topic, subscription);
+  subscription->also_count(middleware_.gateway->border_stats(topic));
+  keep(topic, subscription);
   // Only once all components are wired is it known whether the topic is produced here.
   when_active([this, subscription, topic, &type, shared, options, callback = std::move(callback)] {
     auto& gateway = *middleware_.gateway;
@@ -225,7 +232,6 @@ Subscription ComponentContext::make_subscription(const Port& port,
       subscription->add_shared(middleware_.participant, topic, options);
     } else {
       border_handles_.push_back(gateway.add_consumer(topic, type, options.qos));
-      subscription->also_count(gateway.border_stats(topic));
     }
     subscription->attach(*executor_, tenant_, callback);
   });
@@ -239,7 +245,7 @@ Subscription ComponentContext::make_ros_subscription(const Port& port,
   const std::string topic = topic_of(port);
   auto subscription =
       std::make_shared<RosSubscription>(middleware_.participant, topic, std::move(type), options);
-  subscriptions_.emplace_back(topic, subscription);
+  keep(topic, subscription);
   when_active([this, subscription, callback = std::move(callback)] {
     subscription->attach(*executor_, tenant_, callback);
   });

@@ -56,7 +56,8 @@ class PlainSubscription final : public SubscriptionBackend {
                   const std::string& topic,
                   const SubscribeOptions& options);
 
-  /// Adds what was lost or rejected at this container's border to the stats.
+  /// Adds what was lost or rejected at this container's border to the stats; before anybody asks
+  /// for them.
   void also_count(std::shared_ptr<const AtomicStats> border) { border_stats_ = std::move(border); }
 
   /// Starts delivery on the executor.

@@ -136,6 +136,7 @@ class ComponentContext final : public Context {
   [[nodiscard]] std::string topic_of(const Port& port) const;
   [[nodiscard]] TopicSettings settings_of(const std::string& topic) const;
   void when_active(std::function<void()> action);
+  void keep(const std::string& topic, Subscription subscription);
   Subscription make_ros_subscription(const Port& port,
                                      MessageType type,
                                      Callback callback,
@@ -153,6 +154,7 @@ class ComponentContext final : public Context {
   std::function<void()> exit_request_;
   bool active_ = false;
   std::vector<std::function<void()>> pending_;
+  mutable std::mutex subscriptions_mutex_;  // made on the component's thread, read on any
   std::vector<std::pair<std::string, Subscription>> subscriptions_;
   std::vector<std::unique_ptr<ServiceServer>> services_;
   std::vector<std::shared_ptr<void>> border_handles_;  // what the gateway carries for us
