@@ -302,6 +302,9 @@ Diagnostics::Status ComponentSlot::health() {
     status.values[topic + " rejected"] = std::to_string(stats.rejected);
     status.values[topic + " starved"] = std::to_string(stats.starved);
   }
+  for (const auto& [topic, messages] : parts_->context->unsent()) {
+    status.values[topic + " unsent"] = std::to_string(messages);
+  }
   return status;
 }
 

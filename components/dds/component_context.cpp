@@ -183,16 +183,23 @@ std::future<std::vector<config::Problem>> ComponentContext::request_change(
 }
 
 void ComponentContext::keep(const std::string& topic, Subscription subscription) {
-  const std::lock_guard lock(subscriptions_mutex_);
+  const std::lock_guard lock(endpoints_mutex_);
   subscriptions_.emplace_back(topic, std::move(subscription));
 }
 
 std::vector<PortStats> ComponentContext::subscription_stats() const {
-  const std::lock_guard lock(subscriptions_mutex_);
+  const std::lock_guard lock(endpoints_mutex_);
   std::vector<PortStats> all;
   for (const auto& [topic, subscription] : subscriptions_) {
     all.push_back({topic, subscription->stats()});
   }
+  return all;
+}
+
+std::vector<UnsentCount> ComponentContext::unsent() const {
+  const std::lock_guard lock(endpoints_mutex_);
+  std::vector<UnsentCount> all;
+  for (const auto& [topic, count] : unsent_) all.push_back({topic, count()});
   return all;
 }
 
@@ -210,7 +217,14 @@ std::shared_ptr<PublisherBackend> ComponentContext::make_publisher(const Port& p
                              "cannot produce such a topic as well");
   }
   border_handles_.push_back(middleware_.gateway->add_producer(topic, type, options.qos));
-  return std::make_shared<PlainPublisher>(middleware_.participant, topic, type, options, settings);
+  auto publisher =
+      std::make_shared<PlainPublisher>(middleware_.participant, topic, type, options, settings);
+  const std::lock_guard lock(endpoints_mutex_);
+  unsent_[topic] = [unsent = publisher->unsent_count(),
+                    exported = middleware_.gateway->export_stats(topic)] {
+    return *unsent + exported->lost;
+  };
+  return publisher;
 }
 
 Subscription ComponentContext::make_subscription(const Port& port,
@@ -245,6 +259,7 @@ Subscription ComponentContext::make_ros_subscription(const Port& port,
   const std::string topic = topic_of(port);
   auto subscription =
       std::make_shared<RosSubscription>(middleware_.participant, topic, std::move(type), options);
+  if (middleware_.gateway) subscription->also_count(middleware_.gateway->export_stats(topic));
   keep(topic, subscription);
   when_active([this, subscription, callback = std::move(callback)] {
     subscription->attach(*executor_, tenant_, callback);

@@ -27,13 +27,14 @@ std::shared_ptr<Tenant> make_tenant(const std::string& name, const std::shared_p
 /// Sends a topic of this container out while another process reads it.
 class Gateway::Export : public std::enable_shared_from_this<Export> {
  public:
-  Export(Gateway& gateway, const std::string& topic, const MessageType& type, const Qos& qos)
+  Export(Gateway& gateway, const std::string& topic, const Entry& entry)
       : participant_(gateway.participant_),
         executor_(gateway.executor_),
         log_(gateway.log_),
         topic_(topic),
-        type_(type),
-        qos_(qos),
+        type_(*entry.type),
+        qos_(entry.qos),
+        stats_(entry.export_stats),
         control_(make_tenant("export " + topic, log_)) {}
 
   /// Opens the wire side on the gateway's thread, where all else of an export happens as well: a
@@ -88,9 +89,10 @@ class Gateway::Export : public std::enable_shared_from_this<Export> {
   }
 
   void send(const void* message, const MessageInfo& info) {
+    stats_->count(info);  // what it lost came faster than it can be serialised
     WireData data{&type_, const_cast<void*>(message)};
     auto parameters = write_parameters(info.publish_stamp_ns);
-    (*writer_)->write(&data, parameters);
+    if (!(*writer_)->write(&data, parameters)) ++stats_->lost;
   }
 
   std::shared_ptr<Participant> participant_;
@@ -99,6 +101,7 @@ class Gateway::Export : public std::enable_shared_from_this<Export> {
   std::string topic_;
   const MessageType& type_;
   Qos qos_;
+  std::shared_ptr<AtomicStats> stats_;
   std::shared_ptr<Tenant> control_;
   std::shared_ptr<Tenant> flow_;
   std::unique_ptr<WriterHandle> writer_;
@@ -218,6 +221,11 @@ std::shared_ptr<const AtomicStats> Gateway::border_stats(const std::string& topi
   return entries_[topic].border_stats;
 }
 
+std::shared_ptr<const AtomicStats> Gateway::export_stats(const std::string& topic) {
+  const std::lock_guard lock(mutex_);
+  return entries_[topic].export_stats;
+}
+
 bool Gateway::may_produce(const std::string& topic) {
   const std::lock_guard lock(mutex_);
   return entries_[topic].shared_consumers == 0;
@@ -253,7 +261,7 @@ void Gateway::update(const std::string& topic) {
   if (!imported) entry.incoming.reset();
   if (!exported && entry.outgoing) std::exchange(entry.outgoing, nullptr)->close();
   if (exported && !entry.outgoing) {
-    entry.outgoing = std::make_shared<Export>(*this, topic, *entry.type, entry.qos);
+    entry.outgoing = std::make_shared<Export>(*this, topic, entry);
     entry.outgoing->open();
   }
   if (imported && !entry.incoming) {

@@ -42,6 +42,8 @@ class Gateway : public std::enable_shared_from_this<Gateway> {
   [[nodiscard]] bool may_produce(const std::string& topic);
   /// What was lost or rejected of a topic's messages before they became in-place samples.
   [[nodiscard]] std::shared_ptr<const AtomicStats> border_stats(const std::string& topic);
+  /// What was lost of a topic's messages on their way out to other processes, all of which miss it.
+  [[nodiscard]] std::shared_ptr<const AtomicStats> export_stats(const std::string& topic);
 
  private:
   class Export;
@@ -53,6 +55,7 @@ class Gateway : public std::enable_shared_from_this<Gateway> {
     int consumers = 0;
     int shared_consumers = 0;
     std::shared_ptr<AtomicStats> border_stats = std::make_shared<AtomicStats>();
+    std::shared_ptr<AtomicStats> export_stats = std::make_shared<AtomicStats>();
     std::shared_ptr<Export> outgoing;
     std::shared_ptr<Import> incoming;
   };

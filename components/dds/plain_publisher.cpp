@@ -107,7 +107,7 @@ void PlainPublisher::copy_to(WriterHandle& writer, const void* message) {
   type_.copy(message, copy);
   if (writer->write(copy, eprosima::fastrtps::rtps::InstanceHandle_t()) != ReturnCode::RETCODE_OK) {
     writer->discard_loan(copy);
-    ++unsent_;
+    ++*unsent_;
   }
 }
 
@@ -116,7 +116,7 @@ void PlainPublisher::publish_in_place(void* message, std::int64_t publish_stamp_
   auto parameters = write_parameters(publish_stamp_ns);
   if (!(*in_place_)->write(message, parameters)) {
     (*in_place_)->discard_loan(message);
-    ++unsent_;
+    ++*unsent_;
   }
 }
 
@@ -129,7 +129,7 @@ void PlainPublisher::publish_shared(void* message) {
     if (code != ReturnCode::RETCODE_TIMEOUT) break;
   } while (std::chrono::steady_clock::now() < deadline);
   // Kept for the next loan: giving it back would let the pool reuse a sample that is being read.
-  ++unsent_;
+  ++*unsent_;
   const std::lock_guard lock(mutex_);
   if (unsent_loan_ == nullptr) {
     unsent_loan_ = message;

@@ -30,8 +30,10 @@ class PlainPublisher final : public PublisherBackend {
   void publish_as_of(void* message, std::int64_t publish_stamp_ns);
   void discard(void* message) noexcept override;
   [[nodiscard]] std::size_t subscriber_count() const override;
-  /// Messages that readers in other processes did not get, because they were too slow.
-  [[nodiscard]] std::uint64_t unsent() const { return unsent_; }
+  /// Messages that readers did not get, because they were too slow.
+  [[nodiscard]] std::shared_ptr<const std::atomic<std::uint64_t>> unsent_count() const {
+    return unsent_;
+  }
 
  private:
   [[nodiscard]] bool shared_is_read() const;
@@ -46,7 +48,8 @@ class PlainPublisher final : public PublisherBackend {
   std::chrono::milliseconds max_blocking_;
   std::unique_ptr<WriterHandle> in_place_;
   std::unique_ptr<WriterHandle> shared_;  // only with interprocess zero copy
-  std::atomic<std::uint64_t> unsent_ = 0;
+  std::shared_ptr<std::atomic<std::uint64_t>> unsent_ =
+      std::make_shared<std::atomic<std::uint64_t>>(0);
 
   std::mutex mutex_;  // guards what follows; loans may be made and dropped on any thread
   std::set<void*> shared_loans_;

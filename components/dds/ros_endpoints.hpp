@@ -41,7 +41,18 @@ class RosSubscription final : public SubscriptionBackend {
   void attach(Executor& executor,
               const std::shared_ptr<Tenant>& tenant,
               const Context::Callback& callback);
-  [[nodiscard]] SubscriptionStats stats() const override { return source_->stats.snapshot(); }
+  /// Adds what this container loses, from now on, of the topic's messages on their way out; before
+  /// anybody asks for the stats. Sequence numbers do not show it.
+  void also_count(std::shared_ptr<const AtomicStats> exported) {
+    exported_ = std::move(exported);
+    lost_before_ = exported_->lost;
+  }
+
+  [[nodiscard]] SubscriptionStats stats() const override {
+    SubscriptionStats stats = source_->stats.snapshot();
+    if (exported_) stats.lost += exported_->lost - lost_before_;
+    return stats;
+  }
   [[nodiscard]] std::size_t publisher_count() const override {
     return source_->reader.writer_count();
   }
@@ -61,6 +72,8 @@ class RosSubscription final : public SubscriptionBackend {
     AtomicStats stats;
   };
   std::shared_ptr<Source> source_;
+  std::shared_ptr<const AtomicStats> exported_;
+  std::uint64_t lost_before_ = 0;
 };
 
 }  // namespace camvox::dds

@@ -64,6 +64,13 @@ struct PortStats {
   SubscriptionStats stats;
 };
 
+/// Messages of a component that others did not get.
+struct UnsentCount {
+  std::string topic;
+  std::uint64_t messages =
+      0;  ///< No room, readers too slow, or lost on the way to other processes.
+};
+
 /// Context over Fast DDS. Endpoints are made while the component is constructed, but nothing is
 /// delivered before `activate`.
 class ComponentContext final : public Context {
@@ -89,6 +96,8 @@ class ComponentContext final : public Context {
   [[nodiscard]] std::future<std::vector<config::Problem>> request_change(
       const config::ParameterMap& changes);
   [[nodiscard]] std::vector<PortStats> subscription_stats() const;
+  /// Of internal topics.
+  [[nodiscard]] std::vector<UnsentCount> unsent() const;
 
   [[nodiscard]] const std::string& name() const override { return settings_.name; }
   [[nodiscard]] Logger& log() override { return *log_; }
@@ -154,8 +163,9 @@ class ComponentContext final : public Context {
   std::function<void()> exit_request_;
   bool active_ = false;
   std::vector<std::function<void()>> pending_;
-  mutable std::mutex subscriptions_mutex_;  // made on the component's thread, read on any
+  mutable std::mutex endpoints_mutex_;  // made on the component's thread, read on any
   std::vector<std::pair<std::string, Subscription>> subscriptions_;
+  std::map<std::string, std::function<std::uint64_t()>> unsent_;  // by topic
   std::vector<std::unique_ptr<ServiceServer>> services_;
   std::vector<std::shared_ptr<void>> border_handles_;  // what the gateway carries for us
 };
