@@ -23,8 +23,8 @@ void keep_for_ever(std::shared_ptr<void> thing) {
   kept->push_back(std::move(thing));
 }
 
-dds::ComponentSettings settings_of(const ComponentConfig& config) {
-  dds::ComponentSettings settings{config.name, config.parameters, {}};
+dds::ComponentSettings settings_of(const ComponentConfig& config, std::uint64_t earlier_runs) {
+  dds::ComponentSettings settings{config.name, config.parameters, {}, earlier_runs};
   for (const auto& [port, target] : config.remap) settings.remap[port] = target.topic;
   return settings;
 }
@@ -83,7 +83,7 @@ void ComponentSlot::try_construct() {
   auto parts = std::make_shared<Parts>();
   parts->factory = environment_.plugins->factory(config_.plugin);
   parts->context = std::make_unique<dds::ComponentContext>(
-      settings_of(config_),
+      settings_of(config_, environment_.runs[config_.name]++),
       environment_.middleware,
       executor_,
       log_,

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <functional>
 #include <future>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -23,7 +24,8 @@ struct Environment {
   LoggerFactory make_logger;
   dds::Middleware middleware;
   ExecutorPool executors;
-  std::function<void()> exit_request;  ///< What Context::request_exit of a component does.
+  std::map<std::string, std::uint64_t> runs;  ///< How often a component was made, by its name.
+  std::function<void()> exit_request;         ///< What Context::request_exit of a component does.
 };
 
 /// One component from its construction to its end, with what happens when it fails. Not

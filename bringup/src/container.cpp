@@ -153,7 +153,7 @@ void Container::Implementation::start_control(Container& self) {
   control_executor = std::make_shared<dds::Executor>("control");
   control_executor->start();
   control = std::make_unique<dds::ComponentContext>(
-      dds::ComponentSettings{config.container.name, {}, {}},
+      dds::ComponentSettings{config.container.name, {}, {}, 0},
       environment.middleware,
       control_executor,
       log,

@@ -66,7 +66,6 @@ void DepthComponent::on_extrinsics(const Extrinsics& extrinsics) {
 void DepthComponent::on_cloud(const Sample<Cloud>& cloud) {
   const auto work = progress_.measure();
   if (!config_.lockstep || config_.accumulate_scans == 1) return process(*cloud);
-  if (first_cloud_id_ == 0) first_cloud_id_ = cloud->header().frame_id();
   waiting_.push_back(cloud);
   process_waiting();
   if (waiting_.size() > kMaxWaiting) {  // tracking left a frame out: better late than never
@@ -84,14 +83,14 @@ void DepthComponent::on_pose(const FramePose& pose) {
 
 void DepthComponent::process_waiting() {
   while (!waiting_.empty()) {
-    const auto id = waiting_.front()->header().frame_id();
-    if (id != first_cloud_id_ && newest_pose_id_ + 1 < id) return;
+    if (newest_pose_id_ < last_cloud_id_) return;
     process(*waiting_.front());
     waiting_.pop_front();
   }
 }
 
 void DepthComponent::process(const Cloud& cloud) {
+  last_cloud_id_ = cloud.header().frame_id();
   auto depth = depth_images_.loan();
   depth->header() = cloud.header();
   depth->extrinsics_version(extrinsics_.version());

@@ -25,13 +25,17 @@ ScanAccumulator::ScanAccumulator(int scans, const sensors::RigConfig& rig)
 
 void ScanAccumulator::add_pose(const msg::FramePose& pose) {
   const auto step = steps_.add(pose);
-  const SE3 T_odometry_last = newest_ ? T_odometry_camera_.at(newest_->frame_id) : SE3();
-  if (!step) T_odometry_camera_.clear();  // lost, or the first one
+  const auto frame_id = pose.header().frame_id();
+  // An id that goes back begins a chain of its own, or the limit below would take out its frames.
+  const bool goes_back = newest_ && frame_id <= newest_->frame_id;
+  const bool begins = !step || !newest_ || goes_back;
+  const SE3 T_odometry_last = begins ? SE3() : T_odometry_camera_.at(newest_->frame_id);
+  if (begins) T_odometry_camera_.clear();
+  if (goes_back) kept_.clear();
   newest_.reset();
   if (!steps_.tracked()) return;
-  const auto frame_id = pose.header().frame_id();
   newest_ = Tracked{frame_id, pose.header().stamp_ns()};
-  T_odometry_camera_[frame_id] = step ? T_odometry_last * step->T_from_to : SE3();
+  T_odometry_camera_[frame_id] = begins ? SE3() : T_odometry_last * step->T_from_to;
   while (T_odometry_camera_.size() > kPosesKept) {
     T_odometry_camera_.erase(T_odometry_camera_.begin());
   }

@@ -62,7 +62,6 @@ void DeskewComponent::on_extrinsics(const Extrinsics& extrinsics) {
 void DeskewComponent::on_scan(const Sample<Scan>& scan) {
   const auto work = progress_.measure();
   if (!config_.lockstep) return process(*scan);
-  if (first_scan_id_ == 0) first_scan_id_ = scan->header().frame_id();
   waiting_.push_back(scan);
   process_waiting();
   if (waiting_.size() > kMaxWaiting) {  // tracking left a frame out: better late than never
@@ -90,14 +89,14 @@ void DeskewComponent::on_pose(const FramePose& pose) {
 
 void DeskewComponent::process_waiting() {
   while (!waiting_.empty()) {
-    const auto id = waiting_.front()->header().frame_id();
-    if (id != first_scan_id_ && newest_pose_id_ + 1 < id) return;
+    if (newest_pose_id_ < last_scan_id_) return;
     process(*waiting_.front());
     waiting_.pop_front();
   }
 }
 
 void DeskewComponent::process(const Scan& scan) {
+  last_scan_id_ = scan.header().frame_id();
   take_imu(scan);
   auto cloud = clouds_.loan();
   cloud->header().stamp_ns(scan.image_stamp_ns());

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "camvox/component/earlier_runs.hpp"
 #include "camvox/interfaces/header.hpp"
 
 namespace camvox {
@@ -23,6 +24,7 @@ constexpr Qos kLidarReader{256, false, false};
 constexpr Qos kImuReader{2000, false, false};
 
 constexpr int kLooksBeforeMissing = 5;  // one a second
+constexpr int kBitsOfRun = 32;          // frames of a run, before a restart: four years at 30 Hz
 
 double seconds(std::int64_t time_ns) { return 1e-9 * static_cast<double>(time_ns); }
 
@@ -38,7 +40,8 @@ SyncComponent::SyncComponent(Context& context)
                      sync::to_ns(config_.sync.clock_jump_s),
                      static_cast<std::size_t>(config_.sync.max_pending_frames)),
       stationary_(config_.stationary),
-      progress_(context) {
+      progress_(context),
+      next_frame_id_((earlier_runs(context) << kBitsOfRun) + 1) {
   const int loans = config_.sync.max_pending_frames + 2;
   frame_images_ = context.advertise<FrameImage>({"frame_image", topics::kFrameImage},
                                                 {.qos = qos::kFrames, .max_loans = loans});

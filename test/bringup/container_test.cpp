@@ -1,7 +1,13 @@
+#include <atomic>
 #include <chrono>
+#include <thread>
 
 #include "camvox/dds/component_context.hpp"
+#include "camvox/interfaces/camvox_interfaces.hpp"
 #include "camvox/interfaces/diagnostic_msgs.hpp"
+#include "camvox/interfaces/header.hpp"
+#include "camvox/interfaces/sensor_msgs.hpp"
+#include "camvox/test/test_container.hpp"
 #include "container_fixture.hpp"
 
 namespace camvox::bringup {
@@ -179,6 +185,48 @@ TEST_F(ContainerTest, LoadsAndUnloadsWhileRunning) {
   EXPECT_THAT(container_->components(), IsEmpty());
   EXPECT_THROW(container_->unload(info.id), std::runtime_error);
   EXPECT_EQ(container_->load(config).id, 2U) << "ids are not used twice";
+}
+
+// Frame ids are what tracking and depth tell new frames from old ones by.
+TEST_F(ContainerTest, FrameIdsOfSyncGoOnAfterItWasMadeAnew) {
+  start(
+      "components:\n  - {plugin: camvox::SyncComponent, name: sync, parameters: {\n"
+      "       camera.width_px: 64, camera.height_px: 48, use_imu: false}}\n");
+  test::TestContainer outside;
+  auto& rig = outside.component("rig");
+  auto images = rig.advertise<sensor_msgs::msg::Image>({"image", topics::kImage});
+  std::atomic<std::uint64_t> newest = 0;
+  rig.subscribe<camvox_interfaces::msg::FrameImage>(
+      {"frame_image", topics::kFrameImage},
+      [&](const auto& frame) { newest = frame->header().frame_id(); },
+      {.qos = qos::kFrames});
+  std::int64_t stamp_ns = 1'700'000'000'000'000'000;
+  const auto frames_come = [&] {
+    auto image = images.loan();
+    image->header(interfaces::to_header(stamp_ns += 100'000'000, "camera"));
+    image->width(64);
+    image->height(48);
+    image->step(64);
+    image->encoding("mono8");
+    image->data().assign(64 * 48, 100);
+    images.publish(std::move(image));
+    std::this_thread::sleep_for(20ms);
+    return newest > 0;
+  };
+  outside.activate();
+  ASSERT_TRUE(wait_until(frames_come));
+  EXPECT_LT(newest, 10'000U) << "ids of a first run count from 1";
+  const std::uint64_t before = newest.exchange(0);
+  ComponentConfig config;
+  config.plugin = "camvox::SyncComponent";
+  config.name = "sync";
+  config.parameters["camera.width_px"] = {std::int64_t{64}, {}};
+  config.parameters["camera.height_px"] = {std::int64_t{48}, {}};
+  container_->unload(component("sync").id);
+  newest = 0;
+  (void)container_->load(config);
+  ASSERT_TRUE(wait_until(frames_come));
+  EXPECT_GT(newest, before + 1000) << "not what came of the first run";
 }
 
 TEST_F(ContainerTest, LoadRefusesASecondPublisherOfAnInternalTopic) {

@@ -6,6 +6,7 @@
 #include "camvox/component/fake_context.hpp"
 #include "camvox/conversion/pose.hpp"
 #include "camvox/depth_component/depth_component.hpp"
+#include "camvox/depth_component/scan_accumulator.hpp"
 
 // A robot that drives and turns towards a slanted wall, and a lidar that sees little of it at a
 // time: truth is the wall.
@@ -173,6 +174,21 @@ TEST_F(AccumulationTest, LiveNothingWaits) {
   DepthComponent component(*fake);
   for (std::uint64_t id = 1; id <= 3; ++id) send_cloud(*fake, id);
   EXPECT_EQ(fake->published<DepthImage>("depth_image").size(), 3U);
+}
+
+TEST_F(AccumulationTest, FrameIdsThatGoBackBeginAnew) {
+  depth_component::ScanAccumulator accumulator(3, {});
+  FramePose pose;
+  pose.state(msg::TRACKING_OK);
+  pose.T_map_camera(conversion::to_array(SE3()));
+  pose.T_keyframe_camera(pose.T_map_camera());
+  const auto add = [&](std::uint64_t id) {
+    pose.header().frame_id(id);
+    pose.header().stamp_ns(pose.header().stamp_ns() + 100'000'000);
+    accumulator.add_pose(pose);
+  };
+  for (std::uint64_t id = 1000; id < 1100; ++id) add(id);
+  for (std::uint64_t id = 1; id < 4; ++id) EXPECT_NO_THROW(add(id));
 }
 
 TEST_F(AccumulationTest, ImpossibleNumbersAreRefused) {

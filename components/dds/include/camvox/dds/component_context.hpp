@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "camvox/component/context.hpp"
+#include "camvox/component/earlier_runs.hpp"
 #include "camvox/dds/executor.hpp"
 #include "camvox/dds/participant.hpp"
 #include "camvox/dds/service.hpp"
@@ -43,6 +44,7 @@ struct ComponentSettings {
   std::string name;
   config::ParameterMap parameters;
   std::map<std::string, std::string, std::less<>> remap;  ///< Port name -> topic name.
+  std::uint64_t earlier_runs = 0;                         ///< See camvox::earlier_runs.
 };
 
 /// A ROS topic, and who publishes and reads it.
@@ -73,7 +75,7 @@ struct UnsentCount {
 
 /// Context over Fast DDS. Endpoints are made while the component is constructed, but nothing is
 /// delivered before `activate`.
-class ComponentContext final : public Context {
+class ComponentContext final : public Context, public RunCounter {
  public:
   /// `on_error` gets each exception that leaves a callback, on the executor's thread.
   ComponentContext(ComponentSettings settings,
@@ -100,6 +102,7 @@ class ComponentContext final : public Context {
   [[nodiscard]] std::vector<UnsentCount> unsent() const;
 
   [[nodiscard]] const std::string& name() const override { return settings_.name; }
+  [[nodiscard]] std::uint64_t earlier_runs() const override { return settings_.earlier_runs; }
   [[nodiscard]] Logger& log() override { return *log_; }
   [[nodiscard]] Diagnostics& diagnostics() override { return diagnostics_; }
   [[nodiscard]] std::int64_t now_ns() const override;

@@ -64,7 +64,7 @@ class DepthComponent final : public Component {
   conversion::ExtrinsicsInForce extrinsics_;
   depth_component::ScanAccumulator accumulator_;
   std::deque<Sample<Cloud>> waiting_;  ///< In lockstep, for poses.
-  std::uint64_t first_cloud_id_ = 0;
+  std::uint64_t last_cloud_id_ = 0;
   std::uint64_t newest_pose_id_ = 0;
   ProgressReporter progress_;
   Publisher<DepthImage> depth_images_;

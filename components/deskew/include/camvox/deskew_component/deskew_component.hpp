@@ -68,7 +68,7 @@ class DeskewComponent final : public Component {
   Publisher<Cloud> clouds_;
   std::deque<Sample<Scan>> waiting_;  // in lockstep, for poses
   std::uint64_t newest_pose_id_ = 0;
-  std::uint64_t first_scan_id_ = 0;
+  std::uint64_t last_scan_id_ = 0;
   std::optional<std::int64_t> previous_image_ns_;
   bool previous_stationary_ = false;
   std::uint64_t by_mode_[4] = {};

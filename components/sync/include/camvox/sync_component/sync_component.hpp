@@ -21,7 +21,8 @@
 namespace camvox {
 
 /// Makes frames of the sensors' streams: for every trigger one frame image and one scan (or one
-/// depth image, of an RGB-D camera) with the same frame id, 1, 2, 3, ... See sync::FrameAssembler
+/// depth image, of an RGB-D camera) with the same frame id, 1, 2, 3, ...; after a restart the ids
+/// go on far above, since they are what all others tell old from new by. See sync::FrameAssembler
 /// for what belongs to a frame and how long it is waited for. Images are decoded when they come,
 /// straight into the memory that tracking will read. A trigger without lidar data gets a scan
 /// without points. Progress is reported for each image, also for those that made no frame.
@@ -67,7 +68,7 @@ class SyncComponent final : public Component {
   Publisher<Scan> scans_;
   Publisher<DepthImage> depth_images_;
   std::deque<Loan<FrameImage>> images_;  // of the pending frames
-  std::uint64_t next_frame_id_ = 1;
+  std::uint64_t next_frame_id_;
   std::optional<std::int64_t> previous_image_ns_;
   int looks_ = 0;  ///< For missing inputs, since the first message.
   bool missing_told_ = false;
