@@ -52,9 +52,12 @@ int run_container(CheckedConfig checked,
       static_cast<std::int64_t>(1e3 * checked.config.container.save_timeout_s));
   auto container = std::make_unique<Container>(
       std::move(checked.config), std::move(checked.probed), std::move(plugins), loggers);
-  ExitGuard guard(kStopPatience, [&container, log] {
-    log->error("does not end: still {}; exits without it", container->current_activity());
-  });
+  ExitGuard guard(
+      kStopPatience,
+      [&container, log] {
+        log->error("does not end: still {}; exits without it", container->current_activity());
+      },
+      [log](const char* what) { log->info("{}", what); });
   container->on_exit_request([&guard] { guard.request(); });
   container->start();
   guard.wait();

@@ -16,6 +16,8 @@
 namespace camvox::command {
 namespace {
 
+constexpr std::chrono::seconds kSameRequest{1};  // signals so close together ask for the same
+
 sigset_t stop_signals() {
   sigset_t set;
   sigemptyset(&set);
@@ -69,8 +71,13 @@ bool StopSignal::wait(std::optional<std::chrono::milliseconds> timeout) {
   return ready >= 0;
 }
 
-ExitGuard::ExitGuard(std::chrono::milliseconds patience, std::function<void()> on_overdue)
-    : patience_(patience), on_overdue_(std::move(on_overdue)), thread_([this] { watch(); }) {}
+ExitGuard::ExitGuard(std::chrono::milliseconds patience,
+                     std::function<void()> on_overdue,
+                     std::function<void(const char*)> tell)
+    : patience_(patience),
+      on_overdue_(std::move(on_overdue)),
+      tell_(std::move(tell)),
+      thread_([this] { watch(); }) {}
 
 ExitGuard::~ExitGuard() {
   over_.set();
@@ -87,11 +94,15 @@ void ExitGuard::wait() { wait_for(asked_.fd(), over_.fd(), {}); }
 void ExitGuard::watch() {
   signal_.wait();
   if (wait_for(over_.fd(), -1, std::chrono::milliseconds(0)) == 0) return;
+  const auto first = std::chrono::steady_clock::now();
   asked_.set();
   extend(patience_);
+  tell_("ends; a second Ctrl-C ends without saving");
   while (std::chrono::steady_clock::now() < deadline_.load()) {
     if (signal_.wait(std::chrono::milliseconds(20))) {
       if (wait_for(over_.fd(), -1, std::chrono::milliseconds(0)) == 0) return;
+      if (std::chrono::steady_clock::now() - first < kSameRequest) continue;
+      tell_("ends without saving: asked for twice");
       std::_Exit(Exit::kInterrupted);
     }
   }

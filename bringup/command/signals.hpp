@@ -44,10 +44,14 @@ class StopSignal {
 };
 
 /// Receives the signals of a process that must end soon after the first: if it does not,
-/// `on_overdue` says what hangs and the process exits with kUnclean. A second signal exits at once.
+/// `on_overdue` says what hangs and the process exits with kUnclean. A second signal exits at once,
+/// unless it follows the first at once: `timeout` and shells send one to the process and to its
+/// group.
 class ExitGuard {
  public:
-  ExitGuard(std::chrono::milliseconds patience, std::function<void()> on_overdue);
+  ExitGuard(std::chrono::milliseconds patience,
+            std::function<void()> on_overdue,
+            std::function<void(const char*)> tell);
   ExitGuard(const ExitGuard&) = delete;
   ExitGuard& operator=(const ExitGuard&) = delete;
   ~ExitGuard();
@@ -65,6 +69,7 @@ class ExitGuard {
   std::chrono::milliseconds patience_;
   std::atomic<std::chrono::steady_clock::time_point> deadline_{};
   std::function<void()> on_overdue_;
+  std::function<void(const char*)> tell_;  ///< What signals do.
   StopSignal signal_;
   Event asked_;
   Event over_;
