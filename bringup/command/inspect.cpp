@@ -99,14 +99,18 @@ void keep_apart(SystemConfig& config, const ProbedSystem& probed, const std::str
       config.components[i].remap[port.name] = {prefix + port.topic, {"camvox inspect", 0}};
     }
   }
-  std::vector<std::string> rules;
   const auto reader = storage::BagReader::open(bag);
   if (!reader.ok()) throw CommandError(reader.status().message());
-  for (const auto& topic : (*reader)->topics()) {
-    rules.push_back(topic.name + ":=" + prefix + topic.name);
-  }
-  for (auto& component : config.components) {
-    if (component.plugin == kReplay) component.parameters["remap"] = given(rules);
+  for (std::size_t i = 0; i < config.components.size(); ++i) {
+    auto& component = config.components[i];
+    if (component.plugin != kReplay) continue;
+    const auto own = std::get<std::vector<std::string>>(
+        probed.components[i].effective_parameters.at("remap").value);
+    std::vector<std::string> rules;
+    for (const auto& topic : (*reader)->topics()) {
+      rules.push_back(topic.name + ":=" + prefix + replayed_as(topic.name, own));
+    }
+    component.parameters["remap"] = given(rules);
   }
 }
 

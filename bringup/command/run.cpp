@@ -65,12 +65,23 @@ void replay_bag(const std::string& bag, SystemConfig& config) {
   replay->parameters.try_emplace("exit_at_end", from_command_line(true, "--bag"));
 }
 
+/// With it comes that mapping waits for loops, if the config has them: when one is found must not
+/// depend on how busy the machine is.
+void use_lockstep(SystemConfig& config) {
+  config.shared_parameters["lockstep"] = from_command_line(true, "--lockstep");
+  const bool loops =
+      std::any_of(config.components.begin(), config.components.end(), [](const auto& component) {
+        return component.plugin == "camvox::LoopClosingComponent";
+      });
+  if (!loops || config.shared_parameters.contains("wait_for_loop_closing")) return;
+  config.file_parameters.insert("wait_for_loop_closing");  // no error without mapping
+  config.shared_parameters["wait_for_loop_closing"] = from_command_line(true, "--lockstep");
+}
+
 /// Carries the options over into what the config says.
 void apply_options(const RunOptions& options, SystemConfig& config) {
   if (!options.bag.empty()) replay_bag(options.bag, config);
-  if (options.lockstep) {
-    config.shared_parameters["lockstep"] = from_command_line(true, "--lockstep");
-  }
+  if (options.lockstep) use_lockstep(config);
   if (!options.map.empty())
     config.shared_parameters["load_map"] = from_command_line(options.map, "--map");
   if (options.localisation_only) {

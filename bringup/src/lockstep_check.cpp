@@ -4,27 +4,12 @@
 
 #include "camvox/bringup/probe.hpp"
 #include "camvox/component/progress.hpp"
+#include "lockstep.hpp"
 
 namespace camvox::bringup {
 namespace {
 
-constexpr auto kKey = "lockstep_components";
 constexpr auto kOffsetKey = "rig.camera_time_offset_ns";
-
-template <typename T>
-T value_of(const ProbedComponent& component, const std::string& key) {
-  const auto found = component.effective_parameters.find(key);
-  if (found == component.effective_parameters.end()) return {};
-  const auto* value = std::get_if<T>(&found->second.value);
-  return value != nullptr ? *value : T{};
-}
-
-const ProbedPort* find_port(const ProbedComponent& component, std::string_view name) {
-  const auto found = std::find_if(component.ports.begin(),
-                                  component.ports.end(),
-                                  [name](const auto& port) { return port.name == name; });
-  return found == component.ports.end() ? nullptr : &*found;
-}
 
 /// Why a component cannot be waited for, or "".
 std::string problem_with(const ProbedComponent& component, const std::string& progress_topic) {
@@ -65,34 +50,56 @@ void check_offset(const ProbedComponent& replay,
   }
 }
 
-}  // namespace
-
-std::vector<Problem> check_lockstep(const SystemConfig& config,
-                                    const std::vector<ProbedComponent>& components) {
+std::vector<Problem> check_components(const SystemConfig& config,
+                                      const std::vector<ProbedComponent>& components,
+                                      const ProbedComponent& replay,
+                                      const std::string& progress_topic) {
   std::vector<std::string> names;
   for (const auto& component : components) names.push_back(component.name);
   const auto& external = config.container.external_topics;
+  std::vector<Problem> problems;
+  const auto report = [&](const std::string& message) {
+    problems.push_back({replay.effective_parameters.at(kLockstepComponents).location,
+                        replay.name + ".parameters." + kLockstepComponents,
+                        message});
+  };
+  const auto waited_for = value_of<std::vector<std::string>>(replay, kLockstepComponents);
+  if (waited_for.empty()) report("lockstep has nobody to wait for: it would drop most frames");
+  for (const auto& name : waited_for) {
+    const auto found = std::find(names.begin(), names.end(), name) - names.begin();
+    if (found < std::ssize(names)) {
+      const auto problem = problem_with(components[found], progress_topic);
+      if (!problem.empty()) report("'" + name + "' " + problem);
+    } else if (std::find(external.begin(), external.end(), progress_topic) == external.end()) {
+      const auto nearest = config::nearest_name(name, names);
+      report("'" + name + "' is no component here" +
+             (nearest.empty() ? "" : " (did you mean '" + nearest + "'?)") + ", and " +
+             progress_topic + " is not in container.external_topics");
+    }
+  }
+  return problems;
+}
+
+}  // namespace
+
+const ProbedPort* find_port(const ProbedComponent& component, std::string_view name) {
+  const auto found = std::find_if(component.ports.begin(),
+                                  component.ports.end(),
+                                  [name](const auto& port) { return port.name == name; });
+  return found == component.ports.end() ? nullptr : &*found;
+}
+
+std::vector<Problem> check_lockstep(const SystemConfig& config,
+                                    const std::vector<ProbedComponent>& components) {
   std::vector<Problem> problems;
   for (const auto& replay : components) {
     const auto* progress = find_port(replay, ProgressReporter::kFrames.name);
     if (progress == nullptr || !value_of<bool>(replay, "lockstep")) continue;
     check_offset(replay, components, problems);
-    for (const auto& name : value_of<std::vector<std::string>>(replay, kKey)) {
-      const auto report = [&](const std::string& message) {
-        problems.push_back({replay.effective_parameters.at(kKey).location,
-                            replay.name + ".parameters." + kKey,
-                            "'" + name + "' " + message});
-      };
-      const auto found = std::find(names.begin(), names.end(), name) - names.begin();
-      if (found < std::ssize(names)) {
-        const auto problem = problem_with(components[found], progress->topic);
-        if (!problem.empty()) report(problem);
-      } else if (std::find(external.begin(), external.end(), progress->topic) == external.end()) {
-        const auto nearest = config::nearest_name(name, names);
-        report("is no component here" +
-               (nearest.empty() ? "" : " (did you mean '" + nearest + "'?)") + ", and " +
-               progress->topic + " is not in container.external_topics");
-      }
+    if (!replay.effective_parameters.contains(kLockstepComponents)) continue;
+    for (auto found : {check_components(config, components, replay, progress->topic),
+                       check_lockstep_topic(components, replay)}) {
+      problems.insert(problems.end(), found.begin(), found.end());
     }
   }
   return problems;

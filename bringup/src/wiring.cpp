@@ -137,6 +137,15 @@ ProbedComponent probe_plugin(const ComponentConfig& component, PluginLoader& plu
   }
 }
 
+/// Needs all components, so it comes after each of them was probed.
+void complete_lockstep(SystemConfig& config, PluginLoader& plugins, ProbedSystem& system) {
+  for (std::size_t i = 0; i < config.components.size(); ++i) {
+    auto& probed = system.components[i];
+    if (!give_lockstep_defaults(system.components, probed, config.components[i])) continue;
+    probed = probe_plugin(config.components[i], plugins);
+  }
+}
+
 }  // namespace
 
 std::vector<Problem> check_wiring(const SystemConfig& config,
@@ -153,10 +162,14 @@ ProbedSystem probe_system(SystemConfig& config, PluginLoader& plugins) {
     if (give_shared_parameters(config.shared_parameters, probed, component)) {
       probed = probe_plugin(component, plugins);
     }
-    system.problems.insert(system.problems.end(), probed.problems.begin(), probed.problems.end());
     system.components.push_back(std::move(probed));
   }
-  if (all_complete(system.components)) {
+  const bool complete = all_complete(system.components);
+  if (complete) complete_lockstep(config, plugins, system);
+  for (const auto& probed : system.components) {
+    system.problems.insert(system.problems.end(), probed.problems.begin(), probed.problems.end());
+  }
+  if (complete) {
     const auto unused = unused_shared_parameters(config, system.components);
     system.problems.insert(system.problems.end(), unused.begin(), unused.end());
     const auto wiring = check_wiring(config, system.components);

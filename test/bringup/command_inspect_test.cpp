@@ -54,6 +54,24 @@ TEST_F(CommandInspect, DrawsTheDepthOfAFrame) {
   EXPECT_GT(picture.rows, 2 * 142);
 }
 
+TEST_F(CommandInspect, FollowsTheTopicNamesOfAConfig) {
+  const auto config =
+      write("own.yaml",
+            "parameters: {use_imu: true}\n"
+            "components:\n"
+            "  - {plugin: camvox::SyncComponent, name: sync,\n"
+            "     remap: {compressed_image: /front/jpeg}}\n"
+            "  - {plugin: camvox::DeskewComponent, name: deskew}\n"
+            "  - {plugin: camvox::DepthComponent, name: depth}\n"
+            "  - {plugin: camvox::TrackingComponent, name: tracking}\n"
+            "  - {plugin: camvox::ReplayComponent, name: replay, parameters: {remap:\n"
+            "     [\"/camera/image_raw/compressed:=/front/jpeg\"]}}\n");
+  const auto result =
+      inspect("bag", {"--frame", "5", "-o", folder_ / "own.png", "--config", config});
+  EXPECT_EQ(result.exit_code, 0) << result.output;
+  EXPECT_THAT(result.output, HasSubstr("frame 5 "));
+}
+
 TEST_F(CommandInspect, DrawsTheFrameNearestToAStamp) {
   const auto result = inspect("bag", {"--stamp", "1700000000.62", "-o", folder_ / "stamp.png"});
   EXPECT_EQ(result.exit_code, 0) << result.output;

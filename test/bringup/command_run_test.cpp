@@ -112,6 +112,24 @@ TEST_F(CommandRun, ResultsAreNotOverwrittenUnasked) {
   EXPECT_THAT(result.output, HasSubstr("is not empty; choose another folder, or add --overwrite"));
 }
 
+/// A bag with a topic of compressed images, without messages.
+std::string bag_of(const std::string& name, const std::string& images) {
+  const auto bag = ::testing::TempDir() + std::to_string(getpid()) + "_" + name;
+  std::filesystem::remove_all(bag);
+  auto writer = storage::BagWriter::create(bag);
+  EXPECT_TRUE(writer.ok()) << writer.status().message();
+  storage::BagTopic topic;
+  topic.name = images;
+  topic.type = "sensor_msgs/msg/CompressedImage";
+  EXPECT_TRUE((*writer)->add_topic(topic).ok());
+  EXPECT_TRUE((*writer)->close().ok());
+  return bag;
+}
+
+constexpr auto kLive =
+    "components:\n"
+    "  - {plugin: camvox::SyncComponent, name: sync, remap: {compressed_image: /front/jpeg}}\n";
+
 TEST_F(CommandRun, EndsWithTheBagThatItReplays) {
   const auto bag = write("empty", "") + ".bag";
   const auto output = write("empty", "") + ".out";
@@ -186,6 +204,54 @@ TEST_F(CommandRun, LockstepEndsWhenWhoItWaitsForHasStopped) {
   EXPECT_EQ(result.exit_code, 3) << result.output;
   EXPECT_THAT(result.output,
               HasSubstr("lockstep waits for reporter (stopped after an error: bad frame)"));
+}
+
+TEST_F(CommandRun, LockstepCountsTheFramesThatSyncReads) {
+  const auto bag = bag_of("front", "/front/jpeg");
+  const auto print =
+      command({"run", write("live.yaml", kLive), "--bag", bag, "--lockstep", "--print-config"});
+  EXPECT_EQ(print.exit_code, 0) << print.output;
+  EXPECT_THAT(print.output, HasSubstr("lockstep_topic: \"/front/jpeg\"  # lockstep"));
+  EXPECT_THAT(print.output, HasSubstr("lockstep_components: [\"sync\"]  # lockstep"));
+}
+
+TEST_F(CommandRun, LockstepKnowsFramesThatReplayRenames) {
+  const auto bag = bag_of("back", "/back/jpeg");
+  const auto config = std::string(kLive) +
+                      "  - {plugin: camvox::ReplayComponent, name: replay,\n"
+                      "     parameters: {remap: [\"/back/jpeg:=/front/jpeg\"]}}\n";
+  const auto print =
+      command({"run", write("live.yaml", config), "--bag", bag, "--lockstep", "--print-config"});
+  EXPECT_EQ(print.exit_code, 0) << print.output;
+  EXPECT_THAT(print.output, HasSubstr("lockstep_topic: \"/back/jpeg\"  # lockstep"));
+}
+
+TEST_F(CommandRun, LockstepRefusesABagWithoutTheFrames) {
+  const auto bag = bag_of("other", "/back/jpeg");
+  const auto refused =
+      command({"run", write("live.yaml", kLive), "--bag", bag, "--lockstep", "--check"});
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_THAT(refused.output,
+              HasSubstr("nothing recorded comes on /camera/image_raw or /front/jpeg, where images "
+                        "are read: " +
+                        bag + " holds /back/jpeg"));
+  const auto wrong = command({"run",
+                              write("live.yaml", kLive),
+                              "--bag",
+                              bag,
+                              "--lockstep",
+                              "--set",
+                              "parameters.lockstep_topic=/back/jpg",
+                              "--check"});
+  EXPECT_EQ(wrong.exit_code, 1);
+  EXPECT_THAT(wrong.output, HasSubstr("no frames on /back/jpg: " + bag + " holds /back/jpeg"));
+}
+
+TEST_F(CommandRun, LockstepMakesMappingWaitForLoops) {
+  const auto print = command({"run", "camvox.yaml", "--lockstep", "--print-config"});
+  EXPECT_EQ(print.exit_code, 0) << print.output;
+  EXPECT_THAT(print.output, HasSubstr("wait_for_loop_closing: true  # --lockstep"));
+  EXPECT_EQ(command({"run", "back_end.yaml", "--lockstep", "--check"}).exit_code, 0);
 }
 
 TEST_F(CommandRun, ParameterFilesServeEveryComponentThatHasTheParameter) {

@@ -159,6 +159,30 @@ TEST(Probe, LockstepThatWouldWaitForEverIsAnError) {
           HasSubstr("'source' does not report which frames are done")));
 }
 
+TEST(Probe, LockstepWaitsForAllWhoReportEachFrameUnlessTold) {
+  const auto system = probe("components:\n" + kReporters +
+                            "  - {plugin: test::FrameReporter, name: mapping}\n"
+                            "  - {plugin: test::FrameReporter, name: elsewhere,\n"
+                            "     remap: {progress: /other/progress}}\n"
+                            "  - {plugin: test::LockstepReplay, name: replay,\n"
+                            "     parameters: {lockstep: true}}\n");
+  EXPECT_THAT(system.problems, IsEmpty());
+  const std::vector<std::string> waited_for = {"tracking", "mapping"};
+  EXPECT_EQ(system.components.back().effective_parameters.at("lockstep_components").value,
+            config::Value(waited_for));
+}
+
+TEST(Probe, LockstepWithNobodyToWaitForIsAnError) {
+  const std::string message =
+      "replay.parameters.lockstep_components: lockstep has nobody to wait for: it would drop most "
+      "frames";
+  EXPECT_THAT(problems_of(kPoseSource + "  - {plugin: test::LockstepReplay, name: replay,\n"
+                                        "     parameters: {lockstep: true}}\n"),
+              ElementsAre("lockstep: " + message));
+  EXPECT_THAT(problems_of(kReporters + lockstep_replay("[]")),
+              ElementsAre("rig.yaml:6: " + message));
+}
+
 TEST(Probe, LockstepMayWaitForAnotherContainer) {
   EXPECT_THAT(probe("container: {external_topics: [/camvox/progress]}\ncomponents:\n" + kReporters +
                     lockstep_replay("[mapping]"))

@@ -62,7 +62,19 @@ enum class MissingWriters { kForbidden, kAllowed };
     const std::vector<ProbedComponent>& components,
     MissingWriters missing = MissingWriters::kForbidden);
 
-/// Components that a replay in lockstep shall wait for, and that do not report each frame.
+/// The name that a recorded topic gets from a replay's rules, "from:=to" each.
+[[nodiscard]] std::string replayed_as(const std::string& topic,
+                                      const std::vector<std::string>& rules);
+
+/// Gives a replay in lockstep what it was not told: whom to wait for (everyone here who reports
+/// each frame), and under which name the recording holds the images that somebody here reads. True
+/// if there was something; it must then be probed again.
+bool give_lockstep_defaults(const std::vector<ProbedComponent>& components,
+                            const ProbedComponent& replay,
+                            ComponentConfig& config);
+
+/// A recording without the frames that lockstep counts, and components that a replay shall wait for
+/// and that do not report each frame.
 [[nodiscard]] std::vector<Problem> check_lockstep(const SystemConfig& config,
                                                   const std::vector<ProbedComponent>& components);
 

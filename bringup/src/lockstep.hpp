@@ -1,0 +1,31 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "camvox/bringup/probe.hpp"
+
+/// What filling in and checking of a replay in lockstep share.
+namespace camvox::bringup {
+
+constexpr auto kLockstepComponents = "lockstep_components";
+
+/// A parameter as it takes effect; T{} if the component has none of this name and type.
+template <typename T>
+T value_of(const ProbedComponent& component, const std::string& key) {
+  const auto found = component.effective_parameters.find(key);
+  if (found == component.effective_parameters.end()) return {};
+  const auto* value = std::get_if<T>(&found->second.value);
+  return value != nullptr ? *value : T{};
+}
+
+/// Null if the component has no such port.
+[[nodiscard]] const ProbedPort* find_port(const ProbedComponent& component, std::string_view name);
+
+/// Frames that the recording does not hold cannot hold the replay back. A bag that cannot be read
+/// is no problem here: replay says so when it starts.
+[[nodiscard]] std::vector<Problem> check_lockstep_topic(
+    const std::vector<ProbedComponent>& components, const ProbedComponent& replay);
+
+}  // namespace camvox::bringup
