@@ -9,6 +9,7 @@
 #include "camvox/bringup/container.hpp"
 #include "command.hpp"
 #include "container_run.hpp"
+#include "recorded_inputs.hpp"
 
 namespace camvox::command {
 namespace {
@@ -63,6 +64,8 @@ void replay_bag(const std::string& bag, SystemConfig& config) {
   }
   replay->parameters["bag"] = from_command_line(bag, "--bag");
   replay->parameters.try_emplace("exit_at_end", from_command_line(true, "--bag"));
+  config.file_parameters.insert("fail_without_poses");  // no error when nothing follows the poses
+  config.shared_parameters.try_emplace("fail_without_poses", from_command_line(true, "--bag"));
 }
 
 /// With it comes that mapping waits for loops, if the config has them: when one is found must not
@@ -155,11 +158,15 @@ int run(const RunOptions& options) {
     fmt::print("{}: valid, {} component{}\n", options.config, count, count == 1 ? "" : "s");
     return Exit::kDone;
   }
+  if (!options.map.empty() && !std::filesystem::exists(options.map))
+    throw CommandError(fmt::format("--map {}: there is no such file", options.map));
   if (!options.output.empty()) prepare_output(options, text);
   fmt::print("# effective config\n{}", text);
   std::fflush(stdout);
   const auto loggers = console_loggers(parse_log_level(checked.config.container.log_level));
-  warn_of_default_calibration(checked.probed.components, *loggers(checked.config.container.name));
+  const auto log = loggers(checked.config.container.name);
+  warn_of_default_calibration(checked.probed.components, *log);
+  warn_of_unrecorded_inputs(checked.probed.components, *log);
   return run_container(std::move(checked), plugins, loggers);
 }
 
@@ -201,8 +208,8 @@ void add_run(CLI::App& app, Action& action) {
   command->footer(
       "Exit code: 0 stopped by Ctrl-C, SIGTERM or the end of --bag, 1 could not start, 2 wrong "
       "command line,\n"
-      "3 a component had failed or hung, or could not save its results, 130 killed by a second "
-      "Ctrl-C.");
+      "3 a component had failed or hung, or could not save its results, or no frame of --bag was "
+      "tracked,\n130 killed by a second Ctrl-C.");
   command->callback([options, &action] { action = [options] { return run(*options); }; });
 }
 

@@ -22,6 +22,7 @@ using camvox_interfaces::msg::MapUpdate;
 using camvox_interfaces::msg::Progress;
 
 constexpr int kFiles = 5;
+constexpr auto kTrajectory = "trajectory.tum";
 constexpr std::array kStates = {"waiting", "ok", "lost", "relocalising", "localisation_only"};
 
 /// Every message counts here, however late this component is.
@@ -87,6 +88,8 @@ ResultsComponent::ResultsComponent(Context& context)
 }
 
 void ResultsComponent::add_pose(const FramePose& pose) {
+  ++frames_;
+  if (pose.features_with_depth() > 0) ++frames_with_depth_;
   const auto state = std::min<std::size_t>(pose.state(), kStates.size() - 1);
   frames_csv_ += fmt::format("{},{},{},{},{},{},{},{},{},{:.3f}\n",
                              pose.header().frame_id(),
@@ -121,16 +124,34 @@ void ResultsComponent::add_update(const MapUpdate& update) {
 }
 
 void ResultsComponent::stop() {
-  if (config_.output_dir.empty()) return;
-  const int saved = save_trajectory("trajectory.tum", path_.frames()) +
-                    save_trajectory("odometry.tum", odometry_) +
-                    save_trajectory("keyframes.tum", path_.keyframes()) +
-                    save_text("frames.csv", frames_csv_) +
-                    save_text("timing.csv", timing_csv(times_s_));
-  context_.log().info("{} of {} frames tracked; results in {}",
-                      odometry_.size(),
-                      std::count(frames_csv_.begin(), frames_csv_.end(), '\n') - 1,
-                      config_.output_dir);
+  if (!config_.output_dir.empty()) save();
+  if (config_.fail_without_poses && odometry_.empty())
+    throw std::runtime_error("no frame was tracked: " + why_no_pose());
+}
+
+std::string ResultsComponent::why_no_pose() const {
+  if (frames_ == 0) return "not one came; see what is said of missing inputs, and the bag's topics";
+  if (frames_with_depth_ == 0) {
+    return fmt::format(
+        "of {} frames none had depth; see what is said of missing inputs, and check the rig",
+        frames_);
+  }
+  return fmt::format(
+      "of {} frames {} had depth, but no place in the map", frames_, frames_with_depth_);
+}
+
+void ResultsComponent::save() {
+  if (frames_ == 0 &&
+      std::filesystem::exists(std::filesystem::path(config_.output_dir) / kTrajectory)) {
+    context_.log().warn("no frame came: the earlier results in {} stay", config_.output_dir);
+    return;
+  }
+  const int saved =
+      save_trajectory(kTrajectory, path_.frames()) + save_trajectory("odometry.tum", odometry_) +
+      save_trajectory("keyframes.tum", path_.keyframes()) + save_text("frames.csv", frames_csv_) +
+      save_text("timing.csv", timing_csv(times_s_));
+  context_.log().info(
+      "{} of {} frames tracked; results in {}", odometry_.size(), frames_, config_.output_dir);
   if (saved < kFiles) {
     throw std::runtime_error(
         fmt::format("{} of {} result files were not saved", kFiles - saved, kFiles));

@@ -130,6 +130,22 @@ constexpr auto kLive =
     "components:\n"
     "  - {plugin: camvox::SyncComponent, name: sync, remap: {compressed_image: /front/jpeg}}\n";
 
+TEST_F(CommandRun, AMapThatIsNotThereIsSaidBeforeAnythingIsWritten) {
+  const auto folder = write("map", "") + ".out";
+  const auto result =
+      command({"run", "replay.yaml", "--out", folder, "--map", "/no/such/map.mcap"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.output, HasSubstr("--map /no/such/map.mcap: there is no such file"));
+  EXPECT_FALSE(std::filesystem::exists(folder));
+}
+
+TEST_F(CommandRun, SaysWhatARecordingHoldsNothingFor) {
+  const auto bag = bag_of("images", "/front/jpeg");
+  const auto result = command({"run", write("live.yaml", kLive), "--bag", bag});
+  EXPECT_THAT(result.output, HasSubstr("holds nothing for input 'lidar' of sync: no /livox/lidar"));
+  EXPECT_THAT(result.output, Not(HasSubstr("nothing for input 'image'")));
+}
+
 TEST_F(CommandRun, EndsWithTheBagThatItReplays) {
   const auto bag = write("empty", "") + ".bag";
   const auto output = write("empty", "") + ".out";

@@ -137,22 +137,26 @@ TEST_F(EndToEnd, ATopicThatTheRecordingLacksIsNamed) {
     const char* topics;
     const char* missing;
     const char* tracked;
+    int exit_code;
   };
   for (const Case& one : {Case{"no_lidar",
                                "/camera/image_raw/compressed, /livox/imu",
                                "'lidar' (topic /livox/lidar ",
-                               "[results]: 0 of 51 frames"},
+                               "[results]: 0 of 51 frames",
+                               3},
                           Case{"no_image",
                                "/livox/lidar, /livox/imu",
                                "'image' (topic /camera/image_raw or /camera/image_raw/compressed ",
-                               "[results]: 0 of 0 frames"},
+                               "[results]: 0 of 0 frames",
+                               3},
                           Case{"no_imu",
                                "/camera/image_raw/compressed, /livox/lidar",
                                "'imu' (topic /livox/imu ",
-                               "[results]: 50 of 51 frames"}}) {
+                               "[results]: 50 of 51 frames",
+                               0}}) {
     const auto result =
         run_all(folder_ / one.name, {"--set", "replay.topics=[" + std::string(one.topics) + "]"});
-    EXPECT_EQ(result.exit_code, 0) << result.output;
+    EXPECT_EQ(result.exit_code, one.exit_code) << "3: no frame tracked\n" << result.output;
     EXPECT_THAT(result.output, HasSubstr("nothing came on input " + std::string(one.missing)));
     EXPECT_THAT(result.output, HasSubstr(one.tracked)) << one.name;
     EXPECT_TRUE(fs::exists(folder_ / one.name / "frames.csv"));

@@ -18,6 +18,7 @@ using camvox_interfaces::msg::Keyframe;
 using camvox_interfaces::msg::MapUpdate;
 using camvox_interfaces::msg::Progress;
 using ::testing::HasSubstr;
+using ::testing::ThrowsMessage;
 
 constexpr std::int64_t kStart_ns = 1'700'000'000'000'000'000;
 
@@ -130,6 +131,38 @@ TEST_F(ResultsTest, AFolderThatIsGoneIsAnErrorInTheLog) {
   EXPECT_THROW(results.stop(), std::runtime_error);
   ASSERT_FALSE(fake_.log_entries().empty());
   EXPECT_THAT(fake_.log_entries()[0].text, HasSubstr("trajectory.tum: cannot be written"));
+}
+
+TEST_F(ResultsTest, ARunWithoutFramesLeavesEarlierResults) {
+  std::ofstream(folder_ / "trajectory.tum") << "1.0 1 2 3 0 0 0 1\n";
+  ResultsComponent results(fake_);
+  results.stop();
+  EXPECT_EQ(text("trajectory.tum"), "1.0 1 2 3 0 0 0 1\n");
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "frames.csv"));
+  ASSERT_FALSE(fake_.log_entries().empty());
+  EXPECT_THAT(fake_.log_entries()[0].text, HasSubstr("the earlier results in"));
+}
+
+TEST_F(ResultsTest, FailsWithoutAPoseIfToldTo) {
+  fake_.set_parameter("fail_without_poses", true);
+  ResultsComponent none(fake_);
+  EXPECT_THAT([&] { none.stop(); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("no frame was tracked: not one came")));
+  FakeContext fake;
+  fake.set_parameter("fail_without_poses", true);
+  ResultsComponent results(fake);
+  FramePose pose;
+  fake.send("frame_pose", pose);
+  EXPECT_THAT([&] { results.stop(); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("of 1 frames none had depth")));
+  pose.features_with_depth(9);
+  fake.send("frame_pose", pose);
+  EXPECT_THAT(
+      [&] { results.stop(); },
+      ThrowsMessage<std::runtime_error>(HasSubstr("of 2 frames 1 had depth, but no place")));
+  pose.state(camvox_interfaces::msg::TRACKING_OK);
+  fake.send("frame_pose", pose);
+  EXPECT_NO_THROW(results.stop());
 }
 
 TEST_F(ResultsTest, WritesNothingWithoutAFolder) {

@@ -13,12 +13,14 @@ namespace camvox {
 
 /// Parameters of ResultsComponent.
 struct ResultsConfig {
-  std::string output_dir;  ///< Folder to write to; "" writes nothing.
+  std::string output_dir;           ///< Folder to write to; "" writes nothing.
+  bool fail_without_poses = false;  ///< A run that tracked no frame ends with an error.
   sensors::RigConfig rig;
 
   template <typename Self, typename Visitor>
   static void visit(Self& self, Visitor&& field) {
     field("output_dir", self.output_dir);
+    field("fail_without_poses", self.fail_without_poses);
     field("rig", self.rig);
   }
 };
@@ -35,10 +37,13 @@ struct ResultsConfig {
 class ResultsComponent final : public Component {
  public:
   explicit ResultsComponent(Context& context);
-  /// Throws std::runtime_error when not all could be saved.
+  /// Where no frame came, earlier results stay. Throws std::runtime_error when not all could be
+  /// saved, or, as configured, there was no pose.
   void stop() override;
 
  private:
+  void save();
+  [[nodiscard]] std::string why_no_pose() const;
   void add_pose(const camvox_interfaces::msg::FramePose& pose);
   void add_update(const camvox_interfaces::msg::MapUpdate& update);
   [[nodiscard]] bool save_trajectory(const char* name, trajectory::Trajectory of_camera);
@@ -50,6 +55,8 @@ class ResultsComponent final : public Component {
   trajectory::KeyframePath path_;
   trajectory::Trajectory odometry_;
   std::string frames_csv_;
+  int frames_ = 0;
+  int frames_with_depth_ = 0;
   std::map<std::string, std::vector<double>> times_s_;  // by component
 };
 

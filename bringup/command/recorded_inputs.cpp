@@ -1,0 +1,78 @@
+#include "recorded_inputs.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+#include <string>
+
+#include "camvox/storage/bag_reader.hpp"
+
+namespace camvox::command {
+namespace {
+
+using bringup::ProbedComponent;
+using Names = std::vector<std::string>;
+
+/// Sensor inputs by their ports; an image may come in either way.
+const std::vector<Names> kInputs = {{"image", "compressed_image"}, {"lidar"}, {"imu"}, {"depth"}};
+
+template <typename T>
+T value_of(const ProbedComponent& component, const std::string& key) {
+  const auto found = component.effective_parameters.find(key);
+  const auto* value = found == component.effective_parameters.end()
+                          ? nullptr
+                          : std::get_if<T>(&found->second.value);
+  return value != nullptr ? *value : T{};
+}
+
+/// Of an input, those topics that other processes publish.
+Names topics_of(const ProbedComponent& component, const Names& input) {
+  Names topics;
+  for (const auto& port : component.ports) {
+    const bool named = std::find(input.begin(), input.end(), port.name) != input.end();
+    if (named && !port.is_output && !port.internal) topics.push_back(port.topic);
+  }
+  return topics;
+}
+
+void warn(const std::vector<ProbedComponent>& components,
+          const std::string& bag,
+          const std::set<std::string>& published,
+          Logger& log) {
+  for (const auto& component : components) {
+    for (const auto& input : kInputs) {
+      const auto topics = topics_of(component, input);
+      const bool comes = std::any_of(topics.begin(), topics.end(), [&](const auto& topic) {
+        return published.contains(topic);
+      });
+      if (topics.empty() || comes) continue;
+      log.warn("{} holds nothing for input '{}' of {}: no {}; it holds {}",
+               bag,
+               input.front(),
+               component.name,
+               fmt::join(topics, " or "),
+               fmt::join(published, ", "));
+    }
+  }
+}
+
+}  // namespace
+
+void warn_of_unrecorded_inputs(const std::vector<ProbedComponent>& components, Logger& log) {
+  for (const auto& replay : components) {
+    const auto bag = value_of<std::string>(replay, "bag");
+    if (bag.empty()) continue;
+    const auto reader = storage::BagReader::open(bag);
+    if (!reader.ok()) continue;  // replay says why
+    const auto only = value_of<Names>(replay, "topics");
+    std::set<std::string> published;
+    for (const auto& topic : (*reader)->topics()) {
+      if (!only.empty() && std::find(only.begin(), only.end(), topic.name) == only.end()) continue;
+      published.insert(bringup::replayed_as(topic.name, value_of<Names>(replay, "remap")));
+    }
+    warn(components, bag, published, log);
+  }
+}
+
+}  // namespace camvox::command

@@ -1,0 +1,14 @@
+#pragma once
+
+#include <vector>
+
+#include "camvox/bringup/probe.hpp"
+#include "camvox/component/logger.hpp"
+
+namespace camvox::command {
+
+/// Says which sensor inputs get nothing from the recording that a component of the config replays.
+void warn_of_unrecorded_inputs(const std::vector<bringup::ProbedComponent>& components,
+                               Logger& log);
+
+}  // namespace camvox::command
