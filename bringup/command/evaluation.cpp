@@ -95,6 +95,7 @@ Evaluation evaluate(const EvaluationOptions& options) {
         "(--align origin takes the first pose)",
         result.pairs.size()));
   }
+  result.on_a_line = similarity->on_a_line;
   result.aligned = trajectory::transformed(*similarity, result.pairs);
   trajectory::Trajectory driven;
   for (const auto& pair : result.pairs) driven.push_back(pair.reference);
@@ -119,6 +120,9 @@ std::string to_markdown(const EvaluationOptions& options, const Evaluation& resu
       options.alignment,
       result.scale ? fmt::format(", scale error {:+.3f} %", 100.0 * (1.0 / *result.scale - 1.0))
                    : "");
+  if (result.on_a_line) {
+    text += "the path is nearly a line: orientations tell how the estimate is rolled about it\n\n";
+  }
   text += table_head();
   text += row("APE (m)", result.ape_m);
   text += row("APE rotation (deg)", result.ape_deg);

@@ -29,6 +29,7 @@ struct Evaluation {
   std::vector<trajectory::PosePair> pairs;    ///< As read.
   std::vector<trajectory::PosePair> aligned;  ///< Estimates laid over the references.
   double length_m = 0.0;
+  bool on_a_line = false;       ///< See trajectory::Similarity.
   std::optional<double> scale;  ///< Of the reference over the estimate.
   trajectory::Statistics ape_m;
   trajectory::Statistics ape_deg;

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 
 #include "camvox/trajectory/metrics.hpp"
@@ -14,16 +15,23 @@ constexpr auto kEstimateColor = "#d62728";
 constexpr int kWidth_px = 760;
 constexpr int kHeight_px = 420;
 
-/// The axis in which the positions spread least: up, or a camera's y.
-int flattest_axis(const std::vector<trajectory::PosePair>& pairs) {
+/// How a robot may climb: a path that spreads more in z, over its spread in x and y, is one of a
+/// camera's axes, or somebody waves the sensor about.
+constexpr double kSteepest = 0.5;
+
+/// The axis to look along: z, which is up, unless the path says that it is not. Then the one in
+/// which the positions spread least.
+int viewing_axis(const std::vector<trajectory::PosePair>& pairs) {
   Eigen::Vector3d low = pairs.front().reference.T_world_body.translation();
   Eigen::Vector3d high = low;
   for (const auto& pair : pairs) {
     low = low.cwiseMin(pair.reference.T_world_body.translation());
     high = high.cwiseMax(pair.reference.T_world_body.translation());
   }
+  const Eigen::Vector3d spread = high - low;
+  if (spread.z() <= kSteepest * std::max(spread.x(), spread.y())) return 2;
   int axis = 0;
-  (high - low).minCoeff(&axis);
+  spread.minCoeff(&axis);
   return axis;
 }
 
@@ -31,11 +39,13 @@ int flattest_axis(const std::vector<trajectory::PosePair>& pairs) {
 
 trajectory::Chart plan_chart(const std::vector<trajectory::PosePair>& aligned) {
   trajectory::Chart chart;
-  chart.title = "Trajectory from above";
+  chart.title = "Trajectory";
   chart.equal_scales = true;
   if (aligned.empty()) return chart;
   constexpr std::array<std::array<int, 2>, 3> kOthers = {{{1, 2}, {0, 2}, {0, 1}}};
-  const auto [x, y] = kOthers[static_cast<std::size_t>(flattest_axis(aligned))];
+  const int along = viewing_axis(aligned);
+  chart.title += along == 2 ? " from above" : fmt::format(" seen along {}", "xyz"[along]);
+  const auto [x, y] = kOthers[static_cast<std::size_t>(along)];
   chart.x_label = fmt::format("{} (m)", "xyz"[x]);
   chart.y_label = fmt::format("{} (m)", "xyz"[y]);
   trajectory::Series reference{"reference", kReferenceColor, {}};

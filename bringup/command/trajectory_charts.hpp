@@ -8,7 +8,8 @@
 
 namespace camvox::command {
 
-/// Reference and estimate from above: the two axes in which the reference goes farthest.
+/// Reference and estimate from above; where z cannot be up, in the two axes in which the reference
+/// goes farthest. The title says which.
 [[nodiscard]] trajectory::Chart plan_chart(const std::vector<trajectory::PosePair>& aligned);
 
 /// Distance between the two over time.

@@ -63,5 +63,51 @@ TEST_F(CommandEvaluate, SaysWhyThereIsNothingToCompare) {
   EXPECT_EQ(command({"evaluate", line, line, "--align", "origin"}).exit_code, 0);
 }
 
+TEST_F(CommandEvaluate, WritesPlotsAsWhatTheyAre) {
+  const auto file = write("reference.tum", spiral(1.0));
+  const auto png = command({"evaluate", file, file, "--plot", "/no/such/plot.png"});
+  EXPECT_EQ(png.exit_code, 1);
+  EXPECT_THAT(png.output, HasSubstr("--plot /no/such/plot.png: must end in .svg"));
+}
+
+std::string text_of(const std::string& plot) {
+  std::ifstream stream(plot);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+/// Along x, with a bend of `y` and of `z` (m), turning a little.
+std::string path_of(double y, double z) {
+  std::string text;
+  for (int i = 0; i <= 20; ++i) {
+    const double t = 0.05 * i;
+    text += std::to_string(t) + " " + std::to_string(20.0 * t) + " " + std::to_string(y * t * t) +
+            " " + std::to_string(z * t * t) + " 0 0 0.1 0.995\n";
+  }
+  return text;
+}
+
+// A straight drive over a bump goes farther in z than in y, and is seen from above all the same.
+TEST_F(CommandEvaluate, ThePlanIsSeenFromAbove) {
+  const auto plot = write("plan.svg", "");
+  const auto bump = write("bump.tum", path_of(0.1, 0.3));
+  ASSERT_EQ(command({"evaluate", bump, bump, "--plot", plot}).exit_code, 0);
+  const auto above = text_of(plot);
+  EXPECT_THAT(above, HasSubstr("Trajectory from above"));
+  EXPECT_THAT(above, HasSubstr(">y (m)<"));
+  const auto camera = write("camera.tum", path_of(0.1, 30.0));
+  ASSERT_EQ(command({"evaluate", camera, camera, "--plot", plot}).exit_code, 0);
+  const auto seen = text_of(plot);
+  EXPECT_THAT(seen, HasSubstr("Trajectory seen along y"));
+  EXPECT_THAT(seen, HasSubstr(">z (m)<"));
+}
+
+TEST_F(CommandEvaluate, SaysThatAPathIsALine) {
+  const auto line = write("straight.tum", path_of(0.1, 0.0));
+  const auto result = command({"evaluate", line, line});
+  EXPECT_EQ(result.exit_code, 0) << result.output;
+  EXPECT_THAT(result.output, HasSubstr("the path is nearly a line"));
+  EXPECT_THAT(result.output, HasSubstr("| APE rotation (deg) |    0.0000 |"));
+}
+
 }  // namespace
 }  // namespace camvox::bringup

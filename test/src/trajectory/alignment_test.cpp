@@ -65,6 +65,49 @@ TEST(Align, NothingWhereTheRotationIsNotDetermined) {
   EXPECT_FALSE(align({line[0], line[1]}, Alignment::kSim3));
 }
 
+/// A straight drive of 20 m, nodding a little, and the same seen from elsewhere with position
+/// errors of `error_m` around the line: a screw, which positions alone take for a bend.
+std::vector<PosePair> drive(const geometry::SE3& T_reference_estimate, double error_m) {
+  std::vector<PosePair> pairs;
+  for (int i = 0; i <= 200; ++i) {
+    const double t = 0.1 * i;
+    const geometry::SO3 rotation = geometry::SO3::exp({0.0, 0.01 * std::sin(t), 0.3});
+    const Eigen::Vector3d wave(0.0, std::sin(t), std::cos(t));
+    const geometry::SE3 truth(rotation, {t, 0.01 * wave.y(), 0.0});
+    const geometry::SE3 estimate(rotation,
+                                 {t, error_m * wave.z(), error_m * wave.y() + 0.01 * wave.y()});
+    pairs.push_back({{i, T_reference_estimate * truth}, {i, estimate}});
+  }
+  return pairs;
+}
+
+// The wave of 0.01 m goes sideways in the truth and up in the estimate: positions say that it is
+// rolled by 90 degrees, orientations that it is not.
+TEST(Align, OrientationsTellTheRollAboutAStraightPath) {
+  const auto T = some_transform();
+  for (const double error_m : {0.0, 0.002}) {
+    const auto found = align(drive(T, error_m), Alignment::kSE3);
+    ASSERT_TRUE(found.has_value());
+    EXPECT_TRUE(found->on_a_line);
+    // Waves of 0.012 m over 20 m tilt the line by about 0.012 / 20 rad at most.
+    EXPECT_LT((T.rotation().inverse() * found->T_reference_estimate.rotation()).log().norm(), 2e-3);
+  }
+}
+
+TEST(Align, OrientationsTellTheRollAboutAnExactLine) {
+  std::vector<PosePair> line;
+  const auto T = some_transform();
+  for (int i = 0; i < 10; ++i) {
+    const geometry::SE3 pose(geometry::SO3::exp({0.1 * i, 0.0, 0.2}), {1.0 * i, 2.0 * i, 0.0});
+    line.push_back({{i, T * pose}, {i, pose}});
+  }
+  const auto found = align(line, Alignment::kSE3);
+  ASSERT_TRUE(found.has_value());
+  EXPECT_LT(geometry::local(T, found->T_reference_estimate).norm(), 1e-9);
+  EXPECT_FALSE(align({line[0], line[1]}, Alignment::kSE3));
+  EXPECT_FALSE(align(curve(T, 1.0), Alignment::kSE3)->on_a_line);
+}
+
 TEST(Align, NamesAreThoseOfTheCommandLine) {
   EXPECT_EQ(parse_alignment("sim3"), Alignment::kSim3);
   EXPECT_EQ(parse_alignment("origin"), Alignment::kOrigin);

@@ -23,11 +23,13 @@ enum class Alignment {
 struct Similarity {
   geometry::SE3 T_reference_estimate;
   double scale = 1.0;
+  bool on_a_line = false;  ///< The rotation about the path comes from the orientations.
 };
 
 /// The transform that lays the estimates over the references. Least squares by Umeyama (PAMI 1991),
-/// Eigen's implementation. Nothing when the positions do not determine it: fewer than three pairs,
-/// or all on one line (kSE3, kSim3); none at all (kOrigin).
+/// Eigen's implementation. Positions (nearly) on one line leave the rotation about it open: it is
+/// then the one that makes the orientations agree best. Nothing when that is not determined either:
+/// fewer than three pairs, or a line and no orientations (kSE3, kSim3); no pair at all (kOrigin).
 [[nodiscard]] std::optional<Similarity> align(const std::vector<PosePair>& pairs,
                                               Alignment alignment);
 
