@@ -40,6 +40,10 @@ ConfigError::ConfigError(std::vector<Problem> problems)
     : std::runtime_error(join(problems)), problems_(std::move(problems)) {}
 
 std::string nearest_name(std::string_view misspelt, const std::vector<std::string>& known) {
+  const auto last_part = [](std::string_view key) { return key.substr(key.rfind('.') + 1); };
+  for (const auto& name : known) {  // the right parameter of the wrong block
+    if (name != misspelt && last_part(name) == last_part(misspelt)) return name;
+  }
   const std::size_t tolerance = std::max<std::size_t>(2, misspelt.size() / 3);
   std::string best;
   std::size_t best_distance = tolerance + 1;

@@ -121,6 +121,8 @@ TEST(Value, YamlTextKeepsTheType) {
 
 TEST(NearestName, IsSilentWhenNothingIsNear) {
   EXPECT_EQ(nearest_name("max_rnge_m", {"max_range_m", "mode"}), "max_range_m");
+  EXPECT_EQ(nearest_name("max_range_m", {"max_range", "filter.max_range_m"}), "filter.max_range_m");
+  EXPECT_EQ(nearest_name("filter.max_range_m", {"mode", "max_range_m"}), "max_range_m");
   EXPECT_EQ(nearest_name("zzzz", {"max_range_m", "mode"}), "");
 }
 

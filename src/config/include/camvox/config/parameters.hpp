@@ -46,7 +46,8 @@ class ConfigError : public std::runtime_error {
   std::vector<Problem> problems_;
 };
 
-/// The known name nearest to a misspelt one, or "" if none is near enough to be meant.
+/// The known name nearest to a misspelt one, or "" if none is near enough to be meant. The same
+/// last part in another block ("a.limit_m" for "limit_m") is nearest.
 [[nodiscard]] std::string nearest_name(std::string_view misspelt,
                                        const std::vector<std::string>& known);
 
