@@ -1,12 +1,14 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <filesystem>
 #include <fstream>
 
 #include "camvox/trajectory/chart.hpp"
 #include "command.hpp"
 #include "evaluation.hpp"
 #include "trajectory_charts.hpp"
+#include "validators.hpp"
 
 namespace camvox::command {
 namespace {
@@ -67,6 +69,8 @@ void write_file(const std::string& path, const std::string& text) {
 }
 
 int run(const EvaluateOptions& options) {
+  if (!options.plot.empty() && std::filesystem::path(options.plot).extension() != ".svg")
+    throw CommandError("--plot " + options.plot + ": must end in .svg");
   const auto result = evaluate(options);
   fmt::print("{}", to_markdown(options, result));
   if (!options.plot.empty()) {
@@ -99,7 +103,7 @@ void add_evaluate(CLI::App& app, Action& action) {
       ->check(CLI::NonNegativeNumber);
   command->add_option("--offset", options->offset_s, "Added to the estimate's stamps, in s");
   command->add_option("--delta", options->delta, "Length of the stretches of the RPE (default: 10)")
-      ->check(CLI::PositiveNumber);
+      ->check(above_zero());
   command->add_option("--delta-unit", options->delta_unit, "m (default) or f, frames")
       ->check(CLI::IsMember({"m", "f"}));
   command->add_option("--plot", options->plot, "Writes trajectories and errors as an SVG");

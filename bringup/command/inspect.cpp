@@ -9,6 +9,7 @@
 #include "camvox/storage/bag_reader.hpp"
 #include "command.hpp"
 #include "container_run.hpp"
+#include "validators.hpp"
 
 namespace camvox::command {
 namespace {
@@ -179,9 +180,9 @@ void add_inspect(CLI::App& app, Action& action) {
       ->required()
       ->allow_extra_args(false);
   auto* frame = command->add_option("--frame", options->frame_id, "Frame, from 1 (default: 20)")
-                    ->check(CLI::PositiveNumber);
+                    ->check(above_zero());
   command->add_option("--stamp", options->stamp_s, "Or the frame nearest to this time, in s")
-      ->check(CLI::PositiveNumber)
+      ->check(above_zero())
       ->excludes(frame);
   command->add_option("-o,--output", options->output, "Picture (default: depth_overlay.png)");
   command->add_option("--config",

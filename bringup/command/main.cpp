@@ -14,6 +14,14 @@ int fail(int code, const std::string& message) {
   return code;
 }
 
+/// What is wrong with the command line. A word that is none comes before what it seems to lack.
+std::string usage_problem(const CLI::App& app, const CLI::ParseError& error) {
+  const auto unknown = app.remaining(true);
+  if (dynamic_cast<const CLI::RequiredError*>(&error) == nullptr || unknown.empty())
+    return error.what();
+  return fmt::format("unknown: {}", fmt::join(unknown, " "));
+}
+
 void add_common(CLI::App& app, camvox::command::CommonOptions& common) {
   app.add_option(
          "--domain", common.domain_id, "DDS domain to talk to (default: $ROS_DOMAIN_ID or 0)")
@@ -53,7 +61,7 @@ int main(int argc, char** argv) {
   } catch (const CLI::Success& success) {
     return app.exit(success);  // --help
   } catch (const CLI::ParseError& error) {
-    return fail(Exit::kBadUsage, std::string(error.what()) + " (--help lists what there is)");
+    return fail(Exit::kBadUsage, usage_problem(app, error) + " (--help lists what there is)");
   }
   try {
     return action();

@@ -112,6 +112,8 @@ CheckedConfig check_config(const RunOptions& options, PluginLoader& plugins) {
 void prepare_output(const RunOptions& options, const std::string& effective) {
   const std::filesystem::path folder = options.output;
   std::error_code error;
+  if (std::filesystem::exists(folder) && !std::filesystem::is_directory(folder))
+    throw CommandError(fmt::format("--out {}: is a file, not a folder", options.output));
   const bool used = std::filesystem::exists(folder) && !std::filesystem::is_empty(folder, error);
   if (used && !options.overwrite) {
     throw CommandError(fmt::format(

@@ -42,10 +42,8 @@ const storage::BagTopic& choose_topic(const storage::BagReader& bag, const std::
     for (const auto& topic : topics) {
       if (usable(topic)) names += (names.empty() ? "" : ", ") + topic.name;
     }
-    throw CommandError(fmt::format("no topic {} with poses (there {}: {})",
-                                   wanted,
-                                   names.empty() ? "are none" : "are",
-                                   names));
+    if (names.empty()) throw CommandError("the bag has no topic with poses");
+    throw CommandError(fmt::format("no topic {} with poses (there are: {})", wanted, names));
   }
   const auto truth = std::find_if(found.begin(), found.end(), [](const auto* topic) {
     return topic->name.find("truth") != std::string::npos;

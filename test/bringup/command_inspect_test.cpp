@@ -94,7 +94,9 @@ TEST_F(CommandInspect, WhatIsNotThereIsSaidAndGivesNoPicture) {
 
 TEST_F(CommandInspect, WrongWordsAreRefused) {
   EXPECT_EQ(inspect("bag", {"--frame", "5", "--stamp", "1.0"}).exit_code, 2);
-  EXPECT_EQ(inspect("bag", {"--frame", "0"}).exit_code, 2);
+  const auto zero = inspect("bag", {"--frame", "0"});
+  EXPECT_EQ(zero.exit_code, 2);
+  EXPECT_THAT(zero.output, HasSubstr("'0' is not a number above 0"));
   EXPECT_EQ(command({"inspect", "depth", "--bag", folder_ / "bag"}).exit_code, 2);
   EXPECT_EQ(command({"inspect"}).exit_code, 2);
   const auto picture = inspect("bag", {"-o", folder_ / "overlay.txt"});

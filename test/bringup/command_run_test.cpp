@@ -130,6 +130,14 @@ constexpr auto kLive =
     "components:\n"
     "  - {plugin: camvox::SyncComponent, name: sync, remap: {compressed_image: /front/jpeg}}\n";
 
+TEST_F(CommandRun, OutputThatIsAFileIsRefusedAsSuch) {
+  const auto file = write("file", "text");
+  const auto result = command({"run", write("rig.yaml", kTicker), "--out", file, "--overwrite"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.output, HasSubstr("--out " + file + ": is a file, not a folder"));
+  EXPECT_THAT(result.output, Not(HasSubstr("add --overwrite")));
+}
+
 TEST_F(CommandRun, AMapThatIsNotThereIsSaidBeforeAnythingIsWritten) {
   const auto folder = write("map", "") + ".out";
   const auto result =
@@ -344,6 +352,7 @@ TEST_F(CommandRun, WrongCommandLinesAreRefused) {
     EXPECT_THAT(result.output, HasSubstr("camvox: "));
     EXPECT_THAT(result.output, HasSubstr("--help"));
   }
+  EXPECT_THAT(command({"import", "kitti"}).output, HasSubstr("camvox: unknown: kitti"));
 }
 
 TEST_F(CommandRun, HelpNamesEveryWord) {
