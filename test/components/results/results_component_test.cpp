@@ -152,6 +152,8 @@ TEST_F(ResultsTest, FailsWithoutAPoseIfToldTo) {
   fake.set_parameter("fail_without_poses", true);
   ResultsComponent results(fake);
   FramePose pose;
+  pose.T_map_camera(conversion::to_array(camera_at(0.0)));
+  pose.T_keyframe_camera(conversion::to_array(geometry::SE3()));
   fake.send("frame_pose", pose);
   EXPECT_THAT([&] { results.stop(); },
               ThrowsMessage<std::runtime_error>(HasSubstr("of 1 frames none had depth")));
