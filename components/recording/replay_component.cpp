@@ -145,7 +145,10 @@ bool ReplayComponent::wait_for_acknowledgments(std::chrono::nanoseconds timeout)
 
 void ReplayComponent::start() {
   auto bag = storage::BagReader::open(config_.bag);
-  if (!bag.ok()) throw std::runtime_error(bag.status().message());
+  if (!bag.ok()) {
+    if (config_.exit_at_end) context_.request_exit();  // the others would wait for nothing
+    throw std::runtime_error(bag.status().message());
+  }
   for (const auto& problem : (*bag)->problems())
     context_.log().warn("{}", problem.status.message());
   advertise_topics(**bag);

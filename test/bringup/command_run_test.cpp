@@ -170,6 +170,12 @@ TEST_F(CommandRun, EndsWithTheBagThatItReplays) {
   EXPECT_THAT(result.output, HasSubstr("0 messages sent"));
 }
 
+TEST_F(CommandRun, EndsAtOnceWithoutTheBagThatItReplays) {
+  const auto result = command({"run", write("rig.yaml", kTicker), "--bag", "/no/such/bag"});
+  EXPECT_EQ(result.exit_code, 3) << result.output;
+  EXPECT_THAT(result.output, HasSubstr("/no/such/bag"));
+}
+
 /// A bag of images that nobody can read, with these numbers of bytes and a stamp of their own each.
 std::string write_bag(const std::string& folder, const std::vector<std::size_t>& sizes) {
   std::filesystem::remove_all(folder);

@@ -75,6 +75,18 @@ TEST(ReplayComponent, PublishesTheRecordedBytesUnderTheirNewNames) {
   EXPECT_EQ(messages[0]->cdr, recording::stamped_cdr(kStart_ns, 7));
 }
 
+TEST(ReplayComponent, WithoutItsBagARunThatWouldEndWithItEnds) {
+  for (const bool exit_at_end : {false, true}) {
+    FakeContext fake;
+    fake.set_parameter("bag", std::string("/no/such/bag"));
+    fake.set_parameter("exit_at_end", exit_at_end);
+    ReplayComponent replay(fake);
+    EXPECT_THAT([&] { replay.start(); },
+                ::testing::ThrowsMessage<std::runtime_error>(::testing::HasSubstr("/no/such/bag")));
+    EXPECT_EQ(fake.exit_requested(), exit_at_end);
+  }
+}
+
 TEST(ReplayComponent, LockstepSendsTheNextFrameWhenTheLastIsDone) {
   const TemporaryFolder folder;
   recording::write_bag(
