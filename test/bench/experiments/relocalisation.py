@@ -6,10 +6,12 @@
 gaps: 100 frames are missing; the tracker is lost and has to find itself in the map of what came
 before. starts: a fresh run is started anywhere in a map that another one has saved.
 
-A pose is judged when the state is first "ok" again, within 3 s. Once against the run without a
-gap, which has the same map up to there; once against KinectFusion's poses, aligned by all poses
-before the gap (by those of the whole run for starts). KinectFusion's drift by centimetres in a
-second, see relocalisation_bench, so its column says as much about them as about camvox.
+A pose is judged when the state is first "ok" again, within 3 s. Once against a run of all frames:
+for gaps one that closes the loop between the two ends (min_path_m 0.3), as it would drift away
+from the map that the other finds itself in; for starts the one that saved the map. And once against
+KinectFusion's poses, aligned by all poses before the gap, or of the whole run. Those drift by
+centimetres in a second, see relocalisation_bench: that column says as much about them as about
+camvox.
 """
 import argparse
 import math
@@ -104,8 +106,6 @@ class Runs:
     def __init__(self, arguments, folder):
         self.arguments, self.folder = arguments, folder
         self.bag = self.import_frames("whole", lambda number: True)
-        self.out = self.run("whole", self.bag)
-        self.estimate = from_tum(self.out / "trajectory.tum")
         self.truth = kinect_fusion(arguments.redkitchen)
 
     def import_frames(self, name, wanted):
@@ -123,7 +123,12 @@ class Runs:
                "--lockstep", "--out", out, *more, domain=self.arguments.domain)
         return out
 
-    def judge(self, out, first, aligned):
+    def whole_run(self, name, *settings):
+        """Its folder, and its poses by frame."""
+        out = self.run(name, self.bag, *settings)
+        return out, from_tum(out / "trajectory.tum")
+
+    def judge(self, out, first, whole, aligned):
         """Waiting time in s and errors (m, deg) against the whole run and KinectFusion."""
         frames = ((round(int(row["stamp_ns"]) * RATE_HZ / 1e9), row["state"])
                   for row in rows_of(out / "frames.csv"))
@@ -132,26 +137,28 @@ class Runs:
         if found is None or found >= first + WITHIN:
             return None
         pose = from_tum(out / "trajectory.tum")[found]
-        return ((found - first) / RATE_HZ, (self.estimate[found].inverse() * pose).size(),
+        return ((found - first) / RATE_HZ, (whole[found].inverse() * pose).size(),
                 (self.truth[found].inverse() * (aligned * pose)).size())
 
     def gaps(self):
+        _, whole = self.whole_run("closed", "--set", "loop_closing.loop.min_path_m=0.3")
         for last in range(100, 301, 10):
             wanted = [*range(last), *range(last + GAP, last + GAP + WITHIN)]
             bag = self.import_frames(f"gap{last}", set(wanted).__contains__)
-            aligned = alignment(self.truth, self.estimate, range(last))
-            yield last, self.judge(self.run(f"gap{last}", bag), last + GAP, aligned)
+            aligned = alignment(self.truth, whole, range(last))
+            yield last, self.judge(self.run(f"gap{last}", bag), last + GAP, whole, aligned)
             shutil.rmtree(bag)
 
     def starts(self):
         numbers = random.Random(1)
-        aligned = alignment(self.truth, self.estimate, self.estimate)
+        mapped, whole = self.whole_run("mapped")
+        aligned = alignment(self.truth, whole, whole)
         for attempt in range(50):
             first = numbers.randrange(len(self.truth) - WITHIN)
-            out = self.run(f"start{attempt}", self.bag, "--map", self.out / "map.mcap",
+            out = self.run(f"start{attempt}", self.bag, "--map", mapped / "map.mcap",
                            "--localisation-only", "--set",
                            f"replay.start_offset_s={(first - 0.5) / RATE_HZ if first else 0.0}")
-            yield first, self.judge(out, first, aligned)
+            yield first, self.judge(out, first, whole, aligned)
 
 
 def show(title, answers):
