@@ -179,9 +179,12 @@ void ContainerServices::remove_component(const std::string& name) {
 }
 
 bool ContainerServices::end(std::chrono::milliseconds timeout) {
-  bool ended = executor_->remove(container_group_.tenant, timeout);
-  for (const auto& [name, group] : groups_)
-    ended = executor_->remove(group.tenant, timeout) && ended;
+  bool ended = true;
+  const auto end_group = [&](const Group& group) {
+    for (const auto& server : group.servers) ended = server->end(timeout) && ended;
+  };
+  end_group(container_group_);
+  for (const auto& [name, group] : groups_) end_group(group);
   return ended;
 }
 

@@ -105,7 +105,11 @@ ServiceServer::ServiceServer(std::shared_ptr<Participant> participant,
                        [state = implementation_] { return state->take_one(); });
 }
 
-ServiceServer::~ServiceServer() { executor_.remove(tenant_, kTearDownTimeout); }
+ServiceServer::~ServiceServer() { (void)end(kTearDownTimeout); }
+
+bool ServiceServer::end(std::chrono::milliseconds timeout) {
+  return executor_.remove(tenant_, timeout);
+}
 
 bool call_service(const std::shared_ptr<Participant>& participant,
                   const std::string& name,

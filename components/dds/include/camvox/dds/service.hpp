@@ -31,6 +31,9 @@ class ServiceServer {
   ServiceServer& operator=(const ServiceServer&) = delete;
   ~ServiceServer();
 
+  /// No handler begins any more. False: one runs that did not return in time.
+  [[nodiscard]] bool end(std::chrono::milliseconds timeout);
+
  private:
   struct Implementation;
   Executor& executor_;
