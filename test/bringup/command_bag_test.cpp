@@ -2,6 +2,7 @@
 #include <regex>
 
 #include "camvox/storage/bag_writer.hpp"
+#include "camvox/test/deadline.hpp"
 #include "command_fixture.hpp"
 
 namespace camvox::bringup {
@@ -144,8 +145,11 @@ TEST_F(CommandBag, RecordSubscribesAsTheFileOfOverridesSays) {
                                "--qos-profile-overrides-path",
                                qos});
   ASSERT_TRUE(recorder->wrote("recording /camvox/frame_image")) << recorder->output();
-  const auto info = command({"topic", "info", "-v", "/camvox/frame_image"});
-  EXPECT_THAT(info.output, HasSubstr("Reliability: BEST_EFFORT"));
+  std::string info;  // who asks may hear of the topic before it hears of the recorder
+  EXPECT_TRUE(test::wait_until([&] {
+    info = command({"topic", "info", "-v", "/camvox/frame_image"}).output;
+    return info.find("Reliability: BEST_EFFORT") != std::string::npos;
+  })) << info;
   kill(recorder->pid(), SIGINT);
   EXPECT_EQ(recorder->wait(), 0) << recorder->output();
   EXPECT_EQ(stop(), 0) << container_->output();
