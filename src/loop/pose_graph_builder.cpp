@@ -95,24 +95,6 @@ class Builder {
   std::unordered_map<KeyframeId, std::size_t> node_of_;
 };
 
-/// The graph as the map is, without the last digits when it is clear that `bent` costs less.
-optimization::PoseGraphSolution solve_as_is(const CorrectionTask& task,
-                                            const optimization::PoseGraphSolution& bent) {
-  constexpr double kClearly = 0.5;
-  auto rough_config = task.config;
-  rough_config.relative_tolerance = std::max(1e-2, task.config.relative_tolerance);
-  const auto rough = optimization::solve_with_all_edges(task.graph, rough_config);
-  const bool clear = bent.summary.usable && rough.summary.usable &&
-                     bent.summary.cost_after < kClearly * rough.summary.cost_after;
-  if (clear || !rough.summary.usable) return rough;
-  auto graph = task.graph;
-  graph.T_map_node = rough.T_map_node;
-  auto solution = optimization::solve_with_all_edges(graph, task.config);
-  solution.summary.cost_before = rough.summary.cost_before;
-  solution.summary.iterations += rough.summary.iterations;
-  return solution;
-}
-
 /// The robust cost has a minimum at the uncorrected map, however true the loops: far off, they have
 /// hardly any weight. The other start is where all loops hold; that with the lower cost counts, so
 /// loops must be worth what they bend.
@@ -123,7 +105,7 @@ optimization::PoseGraphSolution solve_from_best_start(const CorrectionTask& task
   auto graph = task.graph;
   graph.T_map_node = optimization::solve_with_all_edges(graph, all_hold).T_map_node;
   const auto bent = optimization::solve_with_all_edges(graph, task.config);
-  const auto as_is = solve_as_is(task, bent);
+  const auto as_is = optimization::solve_with_all_edges(task.graph, task.config);
   const bool use_bent = bent.summary.usable && bent.summary.cost_after < as_is.summary.cost_after;
   auto solution =
       optimization::leave_out_outliers(task.graph, use_bent ? bent : as_is, task.config);
