@@ -172,10 +172,7 @@ void ContainerServices::serve_set(Group& group, const std::string& component) {
 }
 
 void ContainerServices::remove_component(const std::string& name) {
-  const auto group = groups_.find(name);
-  if (group == groups_.end()) return;
-  executor_->remove(group->second.tenant, kRemoveTimeout);
-  groups_.erase(group);
+  groups_.erase(name);  // which ends its servers
 }
 
 bool ContainerServices::end(std::chrono::milliseconds timeout) {
