@@ -11,6 +11,17 @@ void KeyframeStore::add(tracking::Keyframe keyframe) {
   keyframes_.push_back(std::move(keyframe));
 }
 
+void KeyframeStore::drop(tracking::KeyframeId id) {
+  const auto found = std::find_if(keyframes_.begin(), keyframes_.end(), [id](const auto& keyframe) {
+    return keyframe.id == id;
+  });
+  if (found == keyframes_.end()) return;
+  for (auto& keyframe : keyframes_) {
+    if (keyframe.parent_id == id) tracking::tie_to_parent_of(*found, keyframe);
+  }
+  keyframes_.erase(found);
+}
+
 std::vector<const tracking::Keyframe*> KeyframeStore::missing(tracking::KeyframeId next_id,
                                                               std::uint64_t map_frame_id,
                                                               std::uint64_t frame_id) {

@@ -146,6 +146,7 @@ void TrackingComponent::process(const FrameInputs& inputs) {
   const double started_s = thread_processor_time_s();
   const auto header = (*inputs.image)->header();
   if (header.frame_id() <= last_frame_id_) begin_ids_anew();
+  make_room();
   auto frame = make_frame(inputs);
   const auto R_previous_camera = frame.R_previous_camera;
   auto result = tracker_.track(std::move(frame));
@@ -163,6 +164,19 @@ void TrackingComponent::begin_ids_anew() {
   map_frame_id_ = 0;
   rotations_ = {};
   tracker_.begin_ids_anew();
+}
+
+/// While mapping is away there is no end to the keyframes.
+void TrackingComponent::make_room() {
+  const auto gone = tracker_.thin_out(static_cast<std::size_t>(config_.keyframes_kept));
+  if (!gone) return;
+  store_.drop(*gone);
+  if (keyframes_thinned_out_ == 0) {
+    context_.log().warn(
+        "mapping lacks {} keyframes (keyframes_kept): the older ones are thinned out",
+        config_.keyframes_kept);
+  }
+  context_.diagnostics().set("keyframes thinned out", ++keyframes_thinned_out_);
 }
 
 tracking::Frame TrackingComponent::make_frame(const FrameInputs& inputs) {

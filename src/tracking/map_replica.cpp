@@ -92,6 +92,39 @@ void MapReplica::add(const Keyframe& keyframe) {
   next_keyframe_id_ = std::max(next_keyframe_id_, keyframe.id + 1);
 }
 
+std::optional<KeyframeId> MapReplica::thin_out(std::size_t most) {
+  constexpr std::size_t kFewest = 4;
+  if (pending_.size() < std::max(most, kFewest)) return std::nullopt;
+  const auto gap = [this](std::size_t i) {
+    return pending_[i + 1].keyframe.id - pending_[i - 1].keyframe.id;
+  };
+  std::size_t index = 1;  // never the oldest: it sees what mapping has
+  for (std::size_t i = 2; i < pending_.size() / 2; ++i) {
+    if (gap(i) < gap(index)) index = i;
+  }
+  const Pending gone = std::move(pending_[index]);
+  pending_.erase(pending_.begin() + static_cast<std::ptrdiff_t>(index));
+  for (auto& own : pending_) {
+    if (own.parent_id == gone.keyframe.id) tie_to_parent_of(gone, own);
+  }
+  remove(gone.keyframe.id);
+  return gone.keyframe.id;
+}
+
+void MapReplica::remove(KeyframeId id) {
+  std::erase_if(keyframes_, [id](const auto& keyframe) { return keyframe.id == id; });
+  const auto founded_before = [this](KeyframeId keyframe) {
+    return std::partition_point(landmarks_.begin(), landmarks_.end(), [keyframe](const auto& own) {
+      return founding_keyframe(own.id) < keyframe;
+    });
+  };
+  const auto begin = founded_before(id);
+  const auto end = founded_before(id + 1);
+  const auto first = strikes_.begin() + (begin - landmarks_.begin());
+  strikes_.erase(first, first + (end - begin));
+  landmarks_.erase(begin, end);
+}
+
 void MapReplica::clear() { *this = MapReplica(camera_, scale_); }
 
 std::optional<std::size_t> MapReplica::find(LandmarkId id) const {

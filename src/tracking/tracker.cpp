@@ -265,6 +265,12 @@ void Tracker::relocalisation_failed(std::uint64_t frame_id) {
   if (requested_frame_id_ == frame_id) requested_frame_id_.reset();
 }
 
+std::optional<KeyframeId> Tracker::thin_out(std::size_t most) {
+  const auto gone = map_.thin_out(most);
+  if (gone == reference_id_) reference_id_ = map_.keyframes().back().id;
+  return gone;
+}
+
 void Tracker::begin_ids_anew() {
   map_.forget_frame_id();
   requested_frame_id_.reset();

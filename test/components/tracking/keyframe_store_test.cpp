@@ -67,6 +67,23 @@ TEST_F(KeyframeStoreTest, TheOldestGoes) {
   EXPECT_EQ(missing(1, 300, 300).front(), 6U);
 }
 
+TEST_F(KeyframeStoreTest, WhatWasTakenFromOneThatIsDroppedHangsOnItsParent) {
+  for (tracking::KeyframeId id = 1; id <= 3; ++id) {
+    tracking::Keyframe keyframe;
+    keyframe.id = id;
+    keyframe.parent_id = id - 1;
+    keyframe.T_parent_camera = geometry::SE3(geometry::SO3(), {0.0, 0.0, static_cast<double>(id)});
+    store_.add(std::move(keyframe));
+  }
+  store_.drop(2);
+  store_.drop(77);  // of which there is none
+  const auto left = store_.missing(1, 0, 0);
+  ASSERT_EQ(left.size(), 2U);
+  EXPECT_EQ(left[1]->id, 3U);
+  EXPECT_EQ(left[1]->parent_id, 1U);
+  EXPECT_DOUBLE_EQ(left[1]->T_parent_camera.translation().z(), 5.0);
+}
+
 TEST_F(KeyframeStoreTest, WithoutCapacityNothingIsKept) {
   KeyframeStore none(0);
   none.add({});

@@ -233,6 +233,43 @@ TEST_F(TrackingComponentTest, WhatMappingLacksIsSentAgain) {
             fake_.published<msg::Keyframe>("keyframe")[0]->features_count());
 }
 
+// Back and forth along the wall, with all keyframes that may be.
+TEST_F(TrackingComponentTest, AMappingThatWasAwayForLongGetsACoarserMapInOnePiece) {
+  fake_.set_parameter("keyframes_kept", std::int64_t{10});
+  fake_.set_parameter("tracker.keyframe.min_inlier_ratio", 1.0);
+  fake_.set_parameter("tracker.keyframe.first_inlier_ratio", 1.0);
+  fake_.set_parameter("tracker.keyframe.max_interval_s", 0.05);
+  fake_.set_parameter("tracker.keyframe.max_pending", std::int64_t{1000});
+  start();
+  for (std::uint64_t k = 1; k <= 120; ++k) {
+    send(k, static_cast<int>(60.0 * std::sin(0.1 * static_cast<double>(k))));
+    ASSERT_EQ(poses().back()->state(), msg::TRACKING_OK) << k;
+  }
+  const auto made = fake_.published<msg::Keyframe>("keyframe");
+  ASSERT_GT(made.size(), 20U);
+  EXPECT_GT(std::stoi(fake_.diagnostics().status().values["keyframes thinned out"]), 10);
+  EXPECT_EQ(fake_.log_entries().size(), 1U) << "said once";
+  EXPECT_THAT(fake_.log_entries().front().text, HasSubstr("10 keyframes"));
+
+  send_local_map(120, 1);
+  send_local_map(120, fake_.published<msg::Keyframe>("resent_keyframe").back()->id() + 1);
+  std::map<std::uint64_t, geometry::SE3> there;
+  for (const auto& keyframe : fake_.published<msg::Keyframe>("resent_keyframe")) {
+    const auto T_map_camera = conversion::to_se3(keyframe->T_map_camera());
+    const auto parent = there.find(keyframe->parent_keyframe_id());
+    ASSERT_TRUE(there.empty() || parent != there.end()) << keyframe->id();
+    if (!there.empty()) {
+      const auto T_parent_camera = conversion::to_se3(keyframe->T_parent_camera());
+      EXPECT_LT(geometry::local(T_map_camera, parent->second * T_parent_camera).norm(), 1e-9);
+    }
+    there[keyframe->id()] = T_map_camera;
+  }
+  EXPECT_GE(there.size(), 9U);
+  EXPECT_LE(there.size(), 10U);
+  EXPECT_EQ(there.begin()->first, 1U);
+  EXPECT_EQ(there.rbegin()->first, made.back()->id());
+}
+
 // Mapping has outlived the tracking before: keyframe 1 is another one there.
 TEST_F(TrackingComponentTest, WhatBelongsToNoMapIsNotSentAgain) {
   start();

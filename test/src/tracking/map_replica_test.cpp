@@ -99,6 +99,47 @@ TEST_F(MapReplicaTest, PendingKeyframesMoveWithTheirParent) {
       1e-12);
 }
 
+// Each keyframe is taken from the one before, 1 m further on.
+TEST_F(MapReplicaTest, OfTooManyPendingKeyframesTheOlderHalfIsThinnedOut) {
+  const auto add = [this](KeyframeId id) {
+    auto own = keyframe(id, 10 * id);
+    own.parent_id = id - 1;
+    own.T_map_camera = SE3(SO3(), {0.0, 0.0, static_cast<double>(id - 1)});
+    replica_.add(own);
+  };
+  ASSERT_TRUE(replica_.apply(local_map(10, 0, {5})));
+  for (KeyframeId id = 2; id <= 11; ++id) add(id);
+  EXPECT_EQ(replica_.thin_out(11), std::nullopt);
+  EXPECT_EQ(replica_.thin_out(10), 3U);
+  EXPECT_EQ(replica_.pending_count(), 9U);
+  EXPECT_FALSE(replica_.T_map_keyframe(3));
+  EXPECT_FALSE(replica_.find(landmark_id(3, 0)));
+  EXPECT_TRUE(replica_.find(landmark_id(4, 0)));
+  add(12);
+  EXPECT_EQ(replica_.thin_out(10), 5U) << "without 4 the gap would be larger";
+  for (KeyframeId id = 13; id <= 100; ++id) {
+    add(id);
+    ASSERT_TRUE(replica_.thin_out(10)) << id;
+  }
+  for (const KeyframeId id : {2, 97, 98, 99, 100}) EXPECT_TRUE(replica_.T_map_keyframe(id)) << id;
+  EXPECT_EQ(replica_.landmarks().size(), 1U + replica_.pending_count());
+
+  // They are one piece still.
+  LocalMap moved = local_map(11, 1, {5});
+  const SE3 T_new_old(SO3::exp({0.0, 0.2, 0.0}), {1.0, 2.0, 3.0});
+  moved.keyframes[0].T_map_camera = T_new_old;
+  ASSERT_TRUE(replica_.apply(moved));
+  for (const auto& [id, T_map_camera] : replica_.keyframes()) {
+    const SE3 T_old(SO3(), {0.0, 0.0, static_cast<double>(id - 1)});
+    EXPECT_LT(geometry::local(T_map_camera, T_new_old * T_old).norm(), 1e-9) << id;
+  }
+}
+
+TEST_F(MapReplicaTest, OfAFewPendingKeyframesNoneGoes) {
+  for (KeyframeId id = 1; id <= 3; ++id) replica_.add(keyframe(id, id));
+  EXPECT_EQ(replica_.thin_out(0), std::nullopt);
+}
+
 TEST_F(MapReplicaTest, OlderMapsAreIgnored) {
   ASSERT_TRUE(replica_.apply(local_map(10, 1, {5})));
   EXPECT_FALSE(replica_.apply(local_map(9, 1, {6})));

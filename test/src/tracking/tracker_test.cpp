@@ -228,6 +228,31 @@ TEST_F(TrackerTest, GoesOnWithoutMapping) {
   EXPECT_LT(error_m(at(70.0)), 0.35) << "0.5 % of the way";
 }
 
+TEST_F(TrackerTest, GoesOnWithoutMappingWhileKeyframesAreThinnedOut) {
+  start();
+  int gone = 0;
+  for (int i = 0; i <= 140; ++i) {
+    gone += tracker_->thin_out(6) ? 1 : 0;
+    step_without_mapping(at(0.5 * i));
+    ASSERT_EQ(result_.state, TrackingState::kTracking) << 0.5 * i << " m";
+    ASSERT_LE(tracker_->map().pending_count(), 6U);
+  }
+  EXPECT_GT(gone, 5);
+  EXPECT_LT(error_m(at(70.0)), 0.35) << "0.5 % of the way, as with all of them";
+}
+
+// Where the camera comes back to, the pose refers to an old keyframe.
+TEST_F(TrackerTest, ThePoseStaysWhenItsKeyframeGoes) {
+  start();
+  for (int i = 0; i <= 60; ++i) step_without_mapping(at(0.5 * i));
+  int i = 60;
+  while (i > 0 && result_.reference_keyframe_id != 2) step_without_mapping(at(0.5 * --i));
+  ASSERT_EQ(tracker_->thin_out(4), 2U);
+  step_without_mapping(at(0.5 * i));
+  ASSERT_EQ(result_.state, TrackingState::kTracking);
+  EXPECT_LT(error_m(at(0.5 * i)), 0.3) << "0.5 % of the way";
+}
+
 TEST_F(TrackerTest, LocalisationOnlyMakesNoKeyframes) {
   start();
   for (int i = 0; i <= 20; ++i) step(at(0.5 * i));

@@ -24,6 +24,10 @@ class KeyframeStore {
   /// Takes a keyframe that was just sent.
   void add(tracking::Keyframe keyframe);
 
+  /// Forgets one that mapping lacks, and ties what was taken from it to its parent: so the others
+  /// make a connected map without it.
+  void drop(tracking::KeyframeId id);
+
   /// For keyframes of another map, whose ids mean others now.
   void clear() { *this = KeyframeStore(capacity_); }
 

@@ -30,7 +30,8 @@ struct TrackingComponentConfig {
   bool use_imu = true;       ///< Wait for the cloud of a frame too: it brings the gyro's rotation.
   std::string load_map;      ///< As mapping's: not "": find the place in that map first.
   bool localisation_only = false;  ///< Make no keyframes: the map stays as it is.
-  /// Of the keyframes sent, the newest that mapping gets again if it lost them (some 100 kB each).
+  /// Of the keyframes sent, the newest that mapping gets again if it lost them (some 200 kB each).
+  /// When it lacks more than that, the older half of them is thinned out.
   int keyframes_kept = 300;
   tracking::TrackerConfig tracker;
   tracking::FrameBuilderConfig frame;
@@ -44,7 +45,7 @@ struct TrackingComponentConfig {
     field("use_imu", self.use_imu);
     field("load_map", self.load_map);
     field("localisation_only", self.localisation_only);
-    field("keyframes_kept", self.keyframes_kept, config::at_least(0));
+    field("keyframes_kept", self.keyframes_kept, config::at_least(10));
     field("tracker", self.tracker);
     field("frame", self.frame);
     field("camera", self.camera);
@@ -57,7 +58,8 @@ struct TrackingComponentConfig {
 /// complete frame counts and what it overtakes is dropped and counted; a frame whose depth does not
 /// come is tracked without when the next one is complete. In lockstep a frame also waits for the
 /// answer to the relocalisation request of the one before, if anybody listens to requests. Tracking
-/// goes on without mapping; what mapping lacks when it is there (again), it gets sent again.
+/// goes on without mapping; what mapping lacks when it is there (again), it gets sent again: all of
+/// it up to `keyframes_kept`, and of a longer time what makes a coarser map in one piece.
 /// Started anew while mapping goes on, it founds a map until it hears of the one that is there, and
 /// then looks for its place in that. The gyro's turns are seen through the extrinsics in force.
 class TrackingComponent final : public Component {
@@ -78,6 +80,7 @@ class TrackingComponent final : public Component {
   [[nodiscard]] bool may_process() const;
   void process(const FrameInputs& inputs);
   void begin_ids_anew();
+  void make_room();
   [[nodiscard]] tracking::Frame make_frame(const FrameInputs& inputs);
   void publish(tracking::FrameResult& result, double time_s);
   void publish_keyframe(const tracking::Keyframe& keyframe,
@@ -106,6 +109,7 @@ class TrackingComponent final : public Component {
   std::uint64_t awaited_answer_ = 0;  ///< In lockstep: to the request of this frame; 0: none.
   std::uint64_t keyframes_sent_ = 0;
   std::uint64_t keyframes_sent_again_ = 0;
+  std::uint64_t keyframes_thinned_out_ = 0;
 };
 
 }  // namespace camvox

@@ -20,6 +20,13 @@ using LandmarkId = std::uint64_t;  ///< See landmark_id; 0: none.
 [[nodiscard]] constexpr KeyframeId founding_keyframe(LandmarkId id) { return id >> 16U; }
 [[nodiscard]] constexpr std::size_t founding_feature(LandmarkId id) { return id & 0xFFFFU; }
 
+/// Ties a keyframe that was taken from `gone` to the parent of that one.
+template <typename Gone, typename Child>
+void tie_to_parent_of(const Gone& gone, Child& child) {
+  child.parent_id = gone.parent_id;
+  child.T_parent_camera = gone.T_parent_camera * child.T_parent_camera;
+}
+
 /// A frame that becomes part of the map, or that shall be relocalised.
 struct Keyframe {
   KeyframeId id = 0;

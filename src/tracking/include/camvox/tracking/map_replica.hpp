@@ -28,6 +28,11 @@ class MapReplica {
   [[nodiscard]] bool is_foreign(const LocalMap& map) const;
   /// Adds a keyframe just made, and the landmarks that it founded.
   void add(const Keyframe& keyframe);
+  /// For a mapping that is away for long: with `most` pending keyframes, or four if that is more,
+  /// one goes together with the landmarks that it founded. It is one of the older half, so that
+  /// what is near the camera stays, and the one there that leaves the smallest gap, but not the
+  /// first. What was taken from it is tied to its parent instead. Returns its id.
+  std::optional<KeyframeId> thin_out(std::size_t most);
   void clear();
   /// Frames count from 1 again: the next map is not older than the present one.
   void forget_frame_id() { frame_id_ = 0; }
@@ -69,6 +74,7 @@ class MapReplica {
   };
 
   void append(const Pending& pending);
+  void remove(KeyframeId id);
   [[nodiscard]] bool shows_other_landmarks(const LocalMap& map) const;
   void move_with_parent(Pending& pending) const;
 

@@ -41,6 +41,9 @@ class Tracker {
   void relocalise(const RelocalisationHint& hint);
   void relocalisation_failed(std::uint64_t frame_id);
 
+  /// Between two frames: of `most` own keyframes that mapping lacks one goes, see MapReplica.
+  std::optional<KeyframeId> thin_out(std::size_t most);
+
   /// The next frames' ids begin at 1 again; their stamps go on.
   void begin_ids_anew();
 
