@@ -38,6 +38,15 @@ class SilentSubscription final : public SubscriptionBackend {
   [[nodiscard]] std::size_t publisher_count() const override { return 0; }
 };
 
+/// The parameter that a constructor means, which may name it as the block does that it checked, and
+/// where it was given.
+std::pair<std::string, Location> as_given(const std::string& key, const ComponentConfig& config) {
+  for (const auto& [full_key, parameter] : config.parameters) {
+    if (full_key == key || full_key.ends_with("." + key)) return {full_key, parameter.location};
+  }
+  return {key, config.plugin_location};
+}
+
 }  // namespace
 
 ProbeContext::ProbeContext(const ComponentConfig& config) : config_(config) {
@@ -157,7 +166,8 @@ ProbedComponent probe_component(const ComponentConfig& config, ComponentFactory&
     context.check_complete();  // after an exception, what it asked for is not known in full
   } catch (const config::ConfigError& error) {
     for (const auto& problem : error.problems()) {
-      context.report(config.plugin_location, "parameters." + problem.key, problem.message);
+      const auto [key, location] = as_given(problem.key, config);
+      context.report(location, "parameters." + key, problem.message);
     }
   } catch (...) {
     context.report(config.plugin_location,

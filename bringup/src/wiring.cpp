@@ -137,6 +137,26 @@ ProbedComponent probe_plugin(const ComponentConfig& component, PluginLoader& plu
   }
 }
 
+/// A mistake in a parameter that components share is said once, with all who have it.
+std::vector<Problem> problems_of(const std::vector<ProbedComponent>& components) {
+  std::vector<Problem> problems;  // at first without the component's name in the key
+  std::map<std::string, std::vector<std::string>> concerned;
+  for (const auto& component : components) {
+    for (auto problem : component.problems) {
+      problem.key.erase(0, component.name.size() + 1);
+      auto& names = concerned[problem.to_string()];
+      if (names.empty()) problems.push_back(problem);
+      if (names.empty() || names.back() != component.name) names.push_back(component.name);
+    }
+  }
+  for (auto& problem : problems) {
+    const auto& names = concerned.at(problem.to_string());
+    if (names.size() == 1) problem.key = names.front() + "." + problem.key;
+    if (names.size() > 1) problem.message += fmt::format(" ({})", fmt::join(names, ", "));
+  }
+  return problems;
+}
+
 /// Needs all components, so it comes after each of them was probed.
 void complete_lockstep(SystemConfig& config, PluginLoader& plugins, ProbedSystem& system) {
   for (std::size_t i = 0; i < config.components.size(); ++i) {
@@ -166,9 +186,7 @@ ProbedSystem probe_system(SystemConfig& config, PluginLoader& plugins) {
   }
   const bool complete = all_complete(system.components);
   if (complete) complete_lockstep(config, plugins, system);
-  for (const auto& probed : system.components) {
-    system.problems.insert(system.problems.end(), probed.problems.begin(), probed.problems.end());
-  }
+  system.problems = problems_of(system.components);
   if (complete) {
     const auto unused = unused_shared_parameters(config, system.components);
     system.problems.insert(system.problems.end(), unused.begin(), unused.end());

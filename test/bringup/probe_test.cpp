@@ -241,6 +241,32 @@ TEST(Probe, SharedParametersGoToComponentsThatHaveThem) {
   EXPECT_EQ(parameters.at("mode").value, config::Value(std::string("slow")));
 }
 
+TEST(Probe, AMistakeInSharedParametersIsSaidOnceWithAllWhoHaveIt) {
+  const auto system =
+      probe("parameters: {limit_m: -4.0}\ncomponents:\n" + kPoseSource + kPoseSink +
+            "  - {plugin: test::PoseSink, name: second}\n"
+            "  - {plugin: test::PoseSink, name: third, parameters: {limit_m: 2.0}}\n"
+            "  - {plugin: test::PoseSink, name: fourth, parameters: {limit_m: -4.0}}\n");
+  std::vector<std::string> texts;
+  for (const auto& problem : system.problems) texts.push_back(problem.to_string());
+  EXPECT_THAT(texts,
+              ElementsAre("rig.yaml:1: parameters.limit_m: -4.0 must be greater than 0 (sink, "
+                          "second)",
+                          "rig.yaml:7: fourth.parameters.limit_m: -4.0 must be greater than 0"));
+}
+
+// As the check of a rig does, which knows nothing of the block's name in the config.
+TEST(Probe, WhatAConstructorRefusesIsFoundWhereItWasGiven) {
+  const auto system = probe(
+      "parameters: {rig: {turn: 0.5}}\ncomponents:\n"
+      "  - {plugin: test::CheckedTurn, name: a}\n"
+      "  - {plugin: test::CheckedTurn, name: b}\n"
+      "  - {plugin: test::CheckedTurn, name: c, parameters: {rig: {turn: 1.0}}}\n");
+  ASSERT_EQ(system.problems.size(), 2U);
+  EXPECT_EQ(system.problems[0].to_string(), "rig.yaml:1: parameters.rig.turn: must be 0 (a, b)");
+  EXPECT_EQ(system.problems[1].to_string(), "rig.yaml:5: c.parameters.rig.turn: must be 0");
+}
+
 TEST(Probe, SharedParametersThatNobodyHasAreAnError) {
   const auto system = probe("parameters: {limit: 4.0, ransac: {cuont: 9}, zzz: 1}\ncomponents:\n" +
                             kPoseSource + kPoseSink);

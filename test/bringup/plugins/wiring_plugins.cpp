@@ -69,6 +69,24 @@ class ThrowingInt : public camvox::Component {
   explicit ThrowingInt(Context&) { throw 42; }
 };
 
+struct TurnConfig {
+  double turn = 0.0;
+
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& field) {
+    field("rig.turn", self.turn);
+  }
+};
+
+/// Refuses its only parameter, and calls it by half of its name.
+class CheckedTurn : public camvox::Component {
+ public:
+  explicit CheckedTurn(Context& context) {
+    if (context.parameters<TurnConfig>().turn == 0.0) return;
+    throw camvox::config::ConfigError({{{}, "turn", "must be 0"}});
+  }
+};
+
 struct ReporterConfig {
   bool fail = false;
   std::int64_t camera_time_offset_ns = 0;
@@ -133,5 +151,6 @@ CAMVOX_REGISTER_COMPONENT(test::OdometrySource)
 CAMVOX_REGISTER_COMPONENT(test::FrameReporter)
 CAMVOX_REGISTER_COMPONENT(test::KeyframeReporter)
 CAMVOX_REGISTER_COMPONENT(test::LockstepReplay)
+CAMVOX_REGISTER_COMPONENT(test::CheckedTurn)
 CAMVOX_REGISTER_COMPONENT(test::ThrowingConstructor)
 CAMVOX_REGISTER_COMPONENT(test::ThrowingInt)

@@ -35,7 +35,7 @@ struct ProbedComponent {
 /// A config with what its components ask for.
 struct ProbedSystem {
   std::vector<ProbedComponent> components;  ///< In the order of the config.
-  std::vector<Problem> problems;            ///< Sorted by line.
+  std::vector<Problem> problems;            ///< Sorted by line, each once.
 };
 
 /// Checks everything that the file alone does not tell: plugins, parameters, ports, wiring. Shared
