@@ -152,6 +152,7 @@ void ProbeContext::check_complete() {
            nearest.empty() ? fmt::format("unknown port (there are {})", fmt::join(ports, ", "))
                            : fmt::format("unknown port (did you mean '{}'?)", nearest));
   }
+  result_.constructed = true;
   if (!has_parameters_) {
     for (const auto& [key, parameter] : config_.parameters) {
       report(parameter.location, "parameters." + key, "the component takes no parameters");

@@ -117,12 +117,8 @@ class WiringCheck {
 
 /// Components that could not be made leave gaps: what they would publish is then not missing.
 bool all_complete(const std::vector<ProbedComponent>& components) {
-  return std::none_of(components.begin(), components.end(), [](const auto& component) {
-    return std::any_of(
-        component.problems.begin(), component.problems.end(), [&](const Problem& problem) {
-          return problem.key == component.name + ".plugin";
-        });
-  });
+  return std::all_of(
+      components.begin(), components.end(), [](const auto& c) { return c.constructed; });
 }
 
 ProbedComponent probe_plugin(const ComponentConfig& component, PluginLoader& plugins) {
@@ -133,7 +129,8 @@ ProbedComponent probe_plugin(const ComponentConfig& component, PluginLoader& plu
     return {component.name,
             {},
             {},
-            {{component.plugin_location, component.name + ".plugin", error.what()}}};
+            {{component.plugin_location, component.name + ".plugin", error.what()}},
+            false};
   }
 }
 
@@ -177,7 +174,7 @@ std::vector<Problem> check_wiring(const SystemConfig& config,
 ProbedSystem probe_system(SystemConfig& config, PluginLoader& plugins) {
   ProbedSystem system;
   for (auto& component : config.components) {
-    auto probed = component.plugin.empty() ? ProbedComponent{component.name, {}, {}, {}}
+    auto probed = component.plugin.empty() ? ProbedComponent{component.name, {}, {}, {}, false}
                                            : probe_plugin(component, plugins);
     if (give_shared_parameters(config.shared_parameters, probed, component)) {
       probed = probe_plugin(component, plugins);

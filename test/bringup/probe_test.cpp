@@ -267,6 +267,13 @@ TEST(Probe, WhatAConstructorRefusesIsFoundWhereItWasGiven) {
   EXPECT_EQ(system.problems[1].to_string(), "rig.yaml:5: c.parameters.rig.turn: must be 0");
 }
 
+TEST(Probe, WhatARefusedComponentWouldPublishIsNotMissing) {
+  EXPECT_THAT(
+      problems_of("  - {plugin: test::CheckedTurn, name: a, parameters: {rig.turn: 1.0}}\n" +
+                  kPoseSink),
+      ElementsAre("rig.yaml:2: a.parameters.rig.turn: must be 0"));
+}
+
 TEST(Probe, SharedParametersThatNobodyHasAreAnError) {
   const auto system = probe("parameters: {limit: 4.0, ransac: {cuont: 9}, zzz: 1}\ncomponents:\n" +
                             kPoseSource + kPoseSink);

@@ -26,6 +26,7 @@ struct ProbedComponent {
   std::vector<ProbedPort> ports;
   ParameterMap effective_parameters;  ///< Defaults included; origin "default" or from the file.
   std::vector<Problem> problems;      ///< Parameters, unknown ports, a constructor that throws.
+  bool constructed = false;           ///< If not, what else it would have asked for is not known.
 };
 
 /// Constructs and destroys a component on a recording context.
