@@ -81,6 +81,7 @@ ResultsComponent::ResultsComponent(Context& context)
       {"progress", topics::kProgress},
       [this](const auto& progress) {
         const auto& name = progress->component_name();
+        came_.insert(progress->header().frame_id());
         times_s_[{name.data(), strnlen(name.data(), name.size())}].push_back(
             progress->processing_time_s());
       },
@@ -89,6 +90,7 @@ ResultsComponent::ResultsComponent(Context& context)
 
 void ResultsComponent::add_pose(const FramePose& pose) {
   ++frames_;
+  came_.insert(pose.header().frame_id());
   if (pose.features_with_depth() > 0) ++frames_with_depth_;
   const auto state = std::min<std::size_t>(pose.state(), kStates.size() - 1);
   frames_csv_ += fmt::format("{},{},{},{},{},{},{},{},{},{:.3f}\n",
@@ -140,6 +142,15 @@ std::string ResultsComponent::why_no_pose() const {
       "of {} frames {} had depth, but no place in the map", frames_, frames_with_depth_);
 }
 
+/// In real time tracking takes the newest frame; those that it overtakes get no pose, not even a
+/// lost one.
+std::string ResultsComponent::not_tried() {
+  came_.erase(0);  // an image that made no frame: of these sync tells
+  const auto frames = static_cast<std::size_t>(frames_);
+  if (came_.size() <= frames) return {};
+  return fmt::format(", {} more were passed over", came_.size() - frames);
+}
+
 void ResultsComponent::save() {
   if (frames_ == 0 &&
       std::filesystem::exists(std::filesystem::path(config_.output_dir) / kTrajectory)) {
@@ -150,8 +161,11 @@ void ResultsComponent::save() {
       save_trajectory(kTrajectory, path_.frames()) + save_trajectory("odometry.tum", odometry_) +
       save_trajectory("keyframes.tum", path_.keyframes()) + save_text("frames.csv", frames_csv_) +
       save_text("timing.csv", timing_csv(times_s_));
-  context_.log().info(
-      "{} of {} frames tracked; results in {}", odometry_.size(), frames_, config_.output_dir);
+  context_.log().info("{} of {} frames tracked{}; results in {}",
+                      odometry_.size(),
+                      frames_,
+                      not_tried(),
+                      config_.output_dir);
   if (saved < kFiles) {
     throw std::runtime_error(
         fmt::format("{} of {} result files were not saved", kFiles - saved, kFiles));

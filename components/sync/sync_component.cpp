@@ -63,6 +63,12 @@ SyncComponent::SyncComponent(Context& context)
   });
 }
 
+void SyncComponent::stop() {
+  tell_missing_inputs(true);
+  const auto shortfall = sync_component::shortfall(assembler_);
+  if (!shortfall.empty()) context_.log().info("{}", shortfall);
+}
+
 /// Says once which inputs nothing has come on: in a recording they may just not be there.
 void SyncComponent::tell_missing_inputs(bool at_end) {
   struct Input {

@@ -93,4 +93,19 @@ void SyncReport::write(Diagnostics& diagnostics,
   diagnostics.report(health.level, health.message);
 }
 
+std::string shortfall(sync::FrameAssembler& assembler) {
+  const auto& frames = assembler.frame_counters();
+  std::string text;
+  const auto add = [&text](std::uint64_t count, const char* what) {
+    if (count > 0) text += fmt::format("{}{} {}", text.empty() ? "" : ", ", count, what);
+  };
+  add(frames.left_out, "made no frame");
+  add(assembler.pending(), "still waited at the end");
+  add(frames.without_lidar, "had not all of their lidar returns");
+  add(frames.without_imu, "had not all of their IMU samples");
+  if (text.empty()) return text;
+  const auto& images = assembler.image_counters();
+  return fmt::format("images: {} came, of which {}", images.received - images.duplicates, text);
+}
+
 }  // namespace camvox::sync_component

@@ -125,6 +125,31 @@ TEST_F(ResultsTest, TimingIsTheStatisticsOfWhatComponentsReported) {
   EXPECT_THAT(text("timing.csv"), HasSubstr("\ndeskew,100,51.000,50.500,95.000,99.000,100.000\n"));
 }
 
+// Sync reports each image, tracking takes the newest of them.
+TEST_F(ResultsTest, SaysHowManyFramesGotNoPoseAtAll) {
+  ResultsComponent results(fake_);
+  for (const std::uint64_t frame : {1, 2, 0, 3, 4, 1, 4}) {  // 0: made no frame
+    Progress progress;
+    progress.header().frame_id(frame);
+    fake_.send("progress", progress);
+  }
+  send_keyframe(1, kStart_ns, 0.0);
+  send_pose(1, 1, 0.0, 0.0);
+  send_pose(4, 1, 0.0, 0.0, camvox_interfaces::msg::TRACKING_LOST);
+  results.stop();
+  EXPECT_THAT(fake_.log_entries().back().text,
+              HasSubstr("1 of 2 frames tracked, 2 more were passed over; results"));
+}
+
+TEST_F(ResultsTest, WithAPoseOfEachNoneWasOvertaken) {
+  ResultsComponent results(fake_);
+  fake_.send("progress", Progress());
+  send_keyframe(1, kStart_ns, 0.0);
+  send_pose(1, 1, 0.0, 0.0);
+  results.stop();
+  EXPECT_THAT(fake_.log_entries().back().text, HasSubstr("1 of 1 frames tracked; results"));
+}
+
 TEST_F(ResultsTest, AFolderThatIsGoneIsAnErrorInTheLog) {
   ResultsComponent results(fake_);
   std::filesystem::remove_all(folder_);

@@ -73,8 +73,9 @@ TEST_F(SyncTest, NamesTheInputThatNothingCameOn) {
   EXPECT_TRUE(fake_.log_entries().empty()) << "a driver may start late";
   fake_.advance(std::chrono::seconds(1));
   component_->stop();
-  ASSERT_EQ(fake_.log_entries().size(), 1U);
+  ASSERT_EQ(fake_.log_entries().size(), 2U);
   EXPECT_THAT(fake_.log_entries()[0].text, HasSubstr("input 'imu' (topic /livox/imu "));
+  EXPECT_THAT(fake_.log_entries()[1].text, HasSubstr("images: 1 came, of which 1 "));
 }
 
 TEST_F(SyncTest, PairsAnImageWithTheReturnsBeforeIt) {
@@ -221,6 +222,21 @@ TEST_F(SyncTest, LateDuplicateAndStrayImagesMakeNoFrame) {
   EXPECT_EQ(counter("image.late"), 1U);
   EXPECT_EQ(counter("image.suspects"), 1U);
   EXPECT_EQ(counter("frames.left_out"), 2U);
+  component_->stop();
+  EXPECT_EQ(fake_.log_entries().back().text, "images: 4 came, of which 2 made no frame");
+}
+
+TEST_F(SyncTest, SaysNothingOfImagesOfWhichEachMadeAWholeFrame) {
+  make();
+  imu_between(0, 300);
+  scan_at(0);
+  scan_at(100);
+  image_at(200);
+  component_->stop();
+  EXPECT_TRUE(fake_.log_entries().empty());
+  image_at(900);  // of which the lidar has yet to tell
+  component_->stop();
+  EXPECT_EQ(fake_.log_entries().back().text, "images: 2 came, of which 1 still waited at the end");
 }
 
 TEST_F(SyncTest, FollowsAClockThatWasSetBack) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -42,6 +43,7 @@ class ResultsComponent final : public Component {
   void stop() override;
 
  private:
+  [[nodiscard]] std::string not_tried();
   void save();
   [[nodiscard]] std::string why_no_pose() const;
   void add_pose(const camvox_interfaces::msg::FramePose& pose);
@@ -56,6 +58,7 @@ class ResultsComponent final : public Component {
   trajectory::Trajectory odometry_;
   std::string frames_csv_;
   int frames_ = 0;
+  std::set<std::uint64_t> came_;  ///< Frames that anybody has seen, tracking or not.
   int frames_with_depth_ = 0;
   std::map<std::string, std::vector<double>> times_s_;  // by component
 };

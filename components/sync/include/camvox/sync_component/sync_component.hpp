@@ -29,7 +29,7 @@ namespace camvox {
 class SyncComponent final : public Component {
  public:
   explicit SyncComponent(Context& context);
-  void stop() override { tell_missing_inputs(true); }
+  void stop() override;
 
  private:
   using FrameImage = camvox_interfaces::msg::FrameImage;

@@ -45,4 +45,7 @@ class SyncReport {
   std::uint64_t incomplete_ = 0;
 };
 
+/// What all images that came lacked, for the end of a run; "" when each made a whole frame.
+[[nodiscard]] std::string shortfall(sync::FrameAssembler& assembler);
+
 }  // namespace camvox::sync_component
