@@ -104,12 +104,16 @@ optimization::PoseGraphSolution solve_from_best_start(const CorrectionTask& task
   all_hold.relative_tolerance = 1e-2;  // only a start
   auto graph = task.graph;
   graph.T_map_node = optimization::solve_with_all_edges(graph, all_hold).T_map_node;
-  const auto bent = optimization::solve_with_all_edges(graph, task.config);
-  const auto as_is = optimization::solve_with_all_edges(task.graph, task.config);
-  const bool use_bent = bent.summary.usable && bent.summary.cost_after < as_is.summary.cost_after;
-  auto solution =
-      optimization::leave_out_outliers(task.graph, use_bent ? bent : as_is, task.config);
-  solution.summary.cost_before = as_is.summary.cost_before;
+  auto best = optimization::solve_with_all_edges(graph, task.config);
+  const bool certain =
+      best.summary.usable && best.summary.cost_after < optimization::cost_of_doubt(task.config);
+  if (!certain) {
+    const auto as_is = optimization::solve_with_all_edges(task.graph, task.config);
+    const bool better = best.summary.usable && best.summary.cost_after < as_is.summary.cost_after;
+    if (!better) best = as_is;
+  }
+  auto solution = optimization::leave_out_outliers(task.graph, best, task.config);
+  solution.summary.cost_before = optimization::cost(task.graph, task.graph.T_map_node, task.config);
   return solution;
 }
 

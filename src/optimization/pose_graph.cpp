@@ -181,6 +181,12 @@ double squared_distance(const PoseGraphEdge& edge, const std::vector<SE3>& T_map
   return r.dot(edge.covariance_to.llt().solve(r));
 }
 
+/// Cauchy's, as ceres::CauchyLoss.
+double kernel(double squared, const PoseGraphConfig& config) {
+  const double squared_width = config.kernel_width_sigma * config.kernel_width_sigma;
+  return squared_width * std::log1p(squared / squared_width);
+}
+
 }  // namespace
 
 std::string PoseGraphSummary::to_string() const {
@@ -211,6 +217,21 @@ RelativePoseResidual evaluate_relative_pose(const SE3& T_map_from,
   result.J_to = SE3::right_jacobian_inverse(result.r);
   result.J_from = -result.J_to * (T_map_to.inverse() * T_map_from).adjoint();
   return result;
+}
+
+double cost(const PoseGraph& graph,
+            const std::vector<SE3>& T_map_node,
+            const PoseGraphConfig& config) {
+  double sum = 0.0;
+  for (const auto& edge : graph.edges) {
+    const double squared = squared_distance(edge, T_map_node);
+    sum += edge.robust ? kernel(squared, config) : squared;
+  }
+  return 0.5 * sum;
+}
+
+double cost_of_doubt(const PoseGraphConfig& config) {
+  return 0.5 * kernel(config.kernel_width_sigma * config.kernel_width_sigma, config);
 }
 
 PoseGraphSolution solve_with_all_edges(const PoseGraph& graph, const PoseGraphConfig& config) {

@@ -261,6 +261,44 @@ TEST(CorrectTest, RejectedLoopsMoveNothing) {
   EXPECT_EQ(correct(task).T_map_camera.size(), 2U);
 }
 
+// The reference solves both starts to the end: the map as it is, and where the loop holds.
+TEST(CorrectTest, TheBetterOfTwoMinimaWins) {
+  constexpr int kNodes = 10;
+  const auto covariance = path_sigma(0.0, DriftConfig()).covariance();
+  const double sigma_m = std::sqrt(covariance(5, 5));
+  bool held = false, left_out = false;
+  for (int offset_sigma = 0; offset_sigma <= 40; ++offset_sigma) {
+    CorrectionTask task;
+    task.config.relative_tolerance = 1e-9;
+    auto& graph = task.graph;
+    for (int i = 0; i < kNodes; ++i) {
+      task.keyframe_ids.push_back(i + 1);
+      graph.T_map_node.emplace_back(geometry::SO3(), Eigen::Vector3d(1.0 * i, 0.0, 0.0));
+      graph.fixed.push_back(i == 0);
+      if (i > 0) graph.edges.push_back({i - 1U, 1U * i, SE3({}, {1.0, 0.0, 0.0}), covariance});
+    }
+    const SE3 loop({}, {kNodes - 1.0, 0.0, offset_sigma * sigma_m});
+    graph.edges.push_back({0, kNodes - 1, loop, covariance, true});
+    task.robust_edges = {{kNodes, 1}};
+    auto bent = graph;
+    for (int i = 0; i < kNodes; ++i)
+      bent.T_map_node[i] = SE3({}, {1.0 * i, 0.0, offset_sigma * sigma_m * i / (kNodes - 1)});
+    const auto from_map = optimization::solve_with_all_edges(graph, task.config);
+    const auto from_loop = optimization::solve_with_all_edges(bent, task.config);
+    const bool bends = from_loop.summary.cost_after < from_map.summary.cost_after;
+    const auto expected =
+        optimization::leave_out_outliers(graph, bends ? from_loop : from_map, task.config);
+    const auto correction = correct(task);
+    EXPECT_EQ(correction.rejected_loops.size(), expected.outliers.size()) << offset_sigma;
+    (correction.rejected_loops.empty() ? held : left_out) = true;
+    for (const auto& [id, T] : correction.T_map_camera)
+      EXPECT_LT(geometry::local(expected.T_map_node[id - 1], T).norm(), 1e-3 * sigma_m);
+    EXPECT_NEAR(correction.summary.cost_before, optimization::cost(graph, graph.T_map_node), 1e-9);
+  }
+  EXPECT_TRUE(held);
+  EXPECT_TRUE(left_out);
+}
+
 TEST_F(LoopCloserTest, NothingIsKnownAtFirst) {
   EXPECT_TRUE(closer_.detect(1).candidates.empty());
   const auto frame = std::make_shared<features::FrameFeatures>();

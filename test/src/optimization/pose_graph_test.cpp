@@ -138,6 +138,33 @@ TEST(PoseGraphTest, LeavesOutAWrongLoop) {
   EXPECT_NEAR(circuit.rmse_m(solution.T_map_node), circuit.rmse_m(clean.T_map_node), 1e-3);
 }
 
+TEST(PoseGraphTest, CostIsTheSolvers) {
+  const Circuit circuit(200);
+  const auto solution = solve_with_all_edges(circuit.graph);
+  const auto& summary = solution.summary;
+  const double before = cost(circuit.graph, circuit.graph.T_map_node);
+  EXPECT_NEAR(before, summary.cost_before, 1e-9 * before);
+  EXPECT_NEAR(cost(circuit.graph, solution.T_map_node), summary.cost_after, 1e-6 * before);
+}
+
+// One robust edge of 1 m a sigma. Its cost over the distance bends the other way at the width.
+TEST(PoseGraphTest, DoubtBeginsWhereTheKernelIsNoLongerConvex) {
+  PoseGraphConfig config;
+  config.kernel_width_sigma = 3.0;
+  PoseGraph graph;
+  graph.fixed = {true, false};
+  graph.edges.push_back({0, 1, SE3(), Matrix6d::Identity(), true});
+  const auto cost_at = [&](double x_m) {
+    return cost(graph, {SE3(), SE3({}, {x_m, 0.0, 0.0})}, config);
+  };
+  const auto bend = [&](double x_m) {
+    return cost_at(x_m - 0.01) - 2.0 * cost_at(x_m) + cost_at(x_m + 0.01);
+  };
+  EXPECT_NEAR(cost_of_doubt(config), cost_at(3.0), 1e-12);
+  EXPECT_GT(bend(2.95), 0.0);
+  EXPECT_LT(bend(3.05), 0.0);
+}
+
 TEST(PoseGraphTest, RepeatsBitForBit) {
   const Circuit circuit(120);
   const auto first = solve(circuit.graph);

@@ -83,6 +83,16 @@ struct RelativePoseResidual {
 /// positive definite.
 [[nodiscard]] PoseGraphSolution solve(const PoseGraph& graph, const PoseGraphConfig& config = {});
 
+/// Half the sum of squares in sigma, kernel included, as in PoseGraphSummary.
+[[nodiscard]] double cost(const PoseGraph& graph,
+                          const std::vector<geometry::SE3>& T_map_node,
+                          const PoseGraphConfig& config = {});
+
+/// The least that a robust edge costs which is beyond the width of its kernel. Below it the kernel
+/// is convex: two different solutions differ in which edges are beyond, so that one of less than
+/// this cost is the best of all.
+[[nodiscard]] double cost_of_doubt(const PoseGraphConfig& config);
+
 /// The two halves of solve(), for who compares solutions in between: all edges stay in, with the
 /// kernel on the robust ones; then those that disagree are left out.
 [[nodiscard]] PoseGraphSolution solve_with_all_edges(const PoseGraph& graph,
