@@ -82,8 +82,10 @@ void ComponentSlot::try_construct() {
   }
   auto parts = std::make_shared<Parts>();
   parts->factory = environment_.plugins->factory(config_.plugin);
+  auto settings = settings_of(config_, environment_.runs[config_.name]++);
+  settings.restart_memory = restart_memory_;
   parts->context = std::make_unique<dds::ComponentContext>(
-      settings_of(config_, environment_.runs[config_.name]++),
+      std::move(settings),
       environment_.middleware,
       executor_,
       log_,

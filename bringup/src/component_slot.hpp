@@ -1,5 +1,6 @@
 #pragma once
 
+#include <any>
 #include <atomic>
 #include <chrono>
 #include <functional>
@@ -107,6 +108,7 @@ class ComponentSlot {
   ComponentConfig config_;
   ProbedComponent probed_;
   Environment& environment_;
+  std::shared_ptr<std::any> restart_memory_ = std::make_shared<std::any>();
   std::shared_ptr<Logger> log_;
   std::shared_ptr<Failures> failures_ = std::make_shared<Failures>();
   std::shared_ptr<dds::Executor> executor_;

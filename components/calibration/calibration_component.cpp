@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "camvox/calibration_component/rig_file.hpp"
+#include "camvox/component/restart_memory.hpp"
 #include "camvox/conversion/pose.hpp"
 
 namespace camvox {
@@ -27,6 +28,8 @@ CalibrationComponent::CalibrationComponent(Context& context)
   if (auto problems = sensors::check(config_.camera); !problems.empty()) {
     throw config::ConfigError(std::move(problems));
   }
+  const auto* memory = restart_memory(context);
+  if (const auto* extrinsics = std::any_cast<Extrinsics>(memory)) put_in_force(*extrinsics);
   const SubscribeOptions frames{.qos = qos::kFrames, .max_held = kFramesKept};
   context.subscribe<FrameImage>(
       {"frame_image", topics::kFrameImage},
@@ -52,6 +55,21 @@ CalibrationComponent::CalibrationComponent(Context& context)
         config_ = next;
       });
   context.diagnostics().report(HealthLevel::kOk, "waiting for a standstill");
+}
+
+/// What was latched is gone with who published it: a component that comes now must get it, too.
+void CalibrationComponent::start() {
+  if (!in_force_) return;
+  extrinsics_.publish(*in_force_);
+  context_.log().info("extrinsics version {} stay in force", in_force_->version());
+}
+
+/// The camera stays where it is on the robot; the lidar, and the IMU with it, move.
+void CalibrationComponent::put_in_force(const Extrinsics& extrinsics) {
+  in_force_ = extrinsics;
+  T_camera_lidar_ = conversion::to_se3(extrinsics.T_camera_lidar());
+  rig_.T_lidar_camera = T_camera_lidar_.inverse();
+  if (auto* memory = restart_memory(context_)) *memory = extrinsics;
 }
 
 template <typename Message>
@@ -134,7 +152,7 @@ void CalibrationComponent::finish(std::uint64_t run, const calibration::Calibrat
 void CalibrationComponent::publish(const calibration::CalibrationResult& result) {
   Extrinsics message;
   message.header(header_);
-  message.version(version_ + 1);
+  message.version(in_force_ ? in_force_->version() + 1 : 1);
   message.T_camera_lidar(conversion::to_array(result.T_camera_lidar));
   message.covariance_lidar(conversion::to_array(result.covariance_lidar));
   message.cost_before(-result.held_back_before);
@@ -144,9 +162,7 @@ void CalibrationComponent::publish(const calibration::CalibrationResult& result)
   extrinsics_.publish(message);
   ++(result.accepted ? accepted_ : refused_);
   if (applied) {
-    ++version_;
-    in_force_ = message;
-    T_camera_lidar_ = result.T_camera_lidar;
+    put_in_force(message);
   } else if (in_force_) {
     // Late readers get the last message: it must be the one in force.
     extrinsics_.publish(*in_force_);
@@ -154,7 +170,6 @@ void CalibrationComponent::publish(const calibration::CalibrationResult& result)
 }
 
 void CalibrationComponent::save(const calibration::CalibrationResult& result) {
-  // The camera stays where it is on the robot; the lidar, and the IMU with it, move.
   auto rig = rig_;
   if (result.accepted) rig.T_lidar_camera = result.T_camera_lidar.inverse();
   const auto text = calibration_component::rig_file_text(config_.camera, sensors::to_config(rig));
@@ -167,7 +182,6 @@ void CalibrationComponent::save(const calibration::CalibrationResult& result) {
           calibration_component::as_comment(calibration::report_text(result)) + text);
   }
   if (!config_.rig_file.empty() && result.accepted) write(config_.rig_file, text);
-  if (result.accepted && !config_.lockstep) rig_ = rig;
 }
 
 }  // namespace camvox

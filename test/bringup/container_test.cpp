@@ -106,6 +106,14 @@ TEST_F(ContainerTest, RestartBuildsTheComponentAnewWithGrowingPauses) {
   EXPECT_GE(component("bad").errors, 3U);
 }
 
+TEST_F(ContainerTest, WhatAComponentLeavesIsThereAfterItsRestart) {
+  start(
+      "components:\n"
+      "  - {plugin: test::Ticker, name: bad, on_error: restart, parameters: {fail_at: 3}}\n");
+  ASSERT_TRUE(wait_until([&] { return component("bad").restarts >= 2; }));
+  EXPECT_TRUE(log_.has("info bad: 3 ticks before the error"));
+}
+
 TEST_F(ContainerTest, IgnoreKeepsTheComponentGoing) {
   start(
       "container: {name: rig, diagnostics_period_s: 0.05}\ncomponents:\n"

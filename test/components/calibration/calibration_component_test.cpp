@@ -125,6 +125,9 @@ TEST_F(CalibrationComponentTest, AppliesABetterResultAtStandstill) {
   EXPECT_THAT(text, HasSubstr("rig:\n"));
   EXPECT_THAT(text, HasSubstr("  T_lidar_camera:\n    rotation_xyzw: ["));
   const auto results = folder_ / "results";
+  const auto* remembered = std::any_cast<Extrinsics>(&fake_.restart_memory());
+  ASSERT_NE(remembered, nullptr);
+  EXPECT_EQ(*remembered, *published[0]);
   EXPECT_TRUE(fs::exists(results / "calibration_before.png"));
   EXPECT_TRUE(fs::exists(results / "calibration_after.png"));
   const std::string verdict = text_of(results / "calibration.yaml");
@@ -135,6 +138,29 @@ TEST_F(CalibrationComponentTest, AppliesABetterResultAtStandstill) {
   EXPECT_EQ(fake_.run_posted(), 0U);
 }
 
+// on_error: restart
+TEST_F(CalibrationComponentTest, WhatIsInForceStaysSoWhenItIsMadeAnew) {
+  const auto T_camera_lidar = test::true_T_camera_lidar();
+  Extrinsics in_force;
+  in_force.version(3);
+  in_force.applied(1);
+  in_force.T_camera_lidar(conversion::to_array(T_camera_lidar));
+  fake_.restart_memory() = in_force;
+  CalibrationComponent component(fake_);
+  EXPECT_TRUE(fake_.published<Extrinsics>("extrinsics").empty());
+  component.start();
+  ASSERT_EQ(fake_.published<Extrinsics>("extrinsics").size(), 1U);
+  EXPECT_EQ(*fake_.published<Extrinsics>("extrinsics")[0], in_force);
+  stand_still();
+  ASSERT_EQ(fake_.run_posted(std::chrono::minutes(2)), 1U);
+  const auto published = fake_.published<Extrinsics>("extrinsics");
+  ASSERT_GE(published.size(), 2U);
+  EXPECT_EQ(published[1]->version(), 4U);
+  // What the rig file says is off by a degree and a half, what is in force is right.
+  const double before = -published[1]->cost_before();
+  EXPECT_GT(before, 0.9 * -published[1]->cost_after());
+}
+
 TEST_F(CalibrationComponentTest, InLockstepItComputesAtOnceAndOnlyProposes) {
   fake_.set_parameter("lockstep", true);
   CalibrationComponent component(fake_);
@@ -143,6 +169,7 @@ TEST_F(CalibrationComponentTest, InLockstepItComputesAtOnceAndOnlyProposes) {
   ASSERT_EQ(published.size(), 1U);  // without waiting for a thread
   EXPECT_EQ(fake_.run_posted(), 0U);
   EXPECT_EQ(published[0]->applied(), 0);
+  EXPECT_FALSE(fake_.restart_memory().has_value());
   EXPECT_THAT(fake_.diagnostics().status().message, HasSubstr("proposed"));
   EXPECT_THAT(text_of(folder_ / "results" / "calibration.yaml"), HasSubstr("# accepted\n"));
   // One for each frame, so that a replay can wait.

@@ -8,6 +8,7 @@
 #include <type_traits>
 
 #include "camvox/component/context.hpp"
+#include "camvox/component/restart_memory.hpp"
 
 namespace camvox {
 
@@ -28,7 +29,7 @@ class FakeSubscription;
 /// component that keeps more than `max_held` samples gets no more, as in the container. The rows of
 /// a new message's lists hold junk, as those of a reused loan do. Mistakes in the test itself (an
 /// unknown port, another type) throw std::logic_error. The context must outlive the component.
-class FakeContext final : public Context {
+class FakeContext final : public Context, public RestartMemory {
  public:
   struct LogEntry {
     LogLevel level = LogLevel::kInfo;
@@ -121,6 +122,8 @@ class FakeContext final : public Context {
   void post(std::function<void()> callback) override;
   void request_exit() override { exit_requested_ = true; }
   [[nodiscard]] bool exit_requested() const { return exit_requested_; }
+  /// A restart is another component on another context that was given this.
+  [[nodiscard]] std::any& restart_memory() override { return restart_memory_; }
   [[nodiscard]] bool all_idle() const override { return all_idle_; }
   /// What all_idle() tells; true unless set.
   void set_all_idle(bool idle) { all_idle_ = idle; }
@@ -186,6 +189,7 @@ class FakeContext final : public Context {
   std::int64_t now_ns_;
   bool exit_requested_ = false;
   bool all_idle_ = true;
+  std::any restart_memory_;
   config::ParameterMap given_;
   config::ParameterMap effective_;
   ChangeHandler change_handler_;

@@ -47,6 +47,7 @@ struct CalibrationComponentConfig {
 /// some seconds, and computes on a thread of its own, so that nothing waits for it. Motion cancels
 /// at once. A result that passes the gate is published as the extrinsics in force (latched,
 /// versioned), any other one as a proposal (applied = 0), after which those in force are repeated.
+/// They stay in force when it is made anew after an error.
 ///
 /// In lockstep it computes while the replay waits, and every result is a proposal: from which frame
 /// on depth projection would take it over depends on timing, and a run must give the same bytes
@@ -58,6 +59,7 @@ class CalibrationComponent final : public Component {
  public:
   explicit CalibrationComponent(Context& context);
   ~CalibrationComponent() override { job_.wait(); }
+  void start() override;
   void stop() override { job_.wait(); }
 
  private:
@@ -68,6 +70,7 @@ class CalibrationComponent final : public Component {
   /// Image and cloud of one frame come in any order.
   template <typename Message>
   void keep(std::map<std::uint64_t, Sample<Message>>& frames, const Sample<Message>& sample);
+  void put_in_force(const Extrinsics& extrinsics);
   void add(const FrameImage& image, const Cloud& cloud);
   void cancel();
   [[nodiscard]] bool wanted(std::int64_t stamp_ns) const;
@@ -81,7 +84,6 @@ class CalibrationComponent final : public Component {
   sensors::RigCalibration rig_;
   geometry::SE3 T_camera_lidar_;
   ProgressReporter progress_;
-  std::uint64_t version_ = 0;
   Publisher<Extrinsics> extrinsics_;
   std::optional<Extrinsics> in_force_;
   bool requested_ = false;
