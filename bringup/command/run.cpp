@@ -147,6 +147,15 @@ void warn_of_default_calibration(const std::vector<ProbedComponent>& components,
   }
 }
 
+/// No container knows how another one runs: only the one who starts them does.
+void remind_of_other_containers(const RunOptions& options,
+                                const ContainerConfig& container,
+                                Logger& log) {
+  if (!options.lockstep || container.external_topics.empty()) return;
+  log.info("--lockstep: the container that publishes {} must run with it, too",
+           fmt::join(container.external_topics, ", "));
+}
+
 int run(const RunOptions& options) {
   const auto plugins = std::make_shared<PluginLoader>();
   auto checked = check_config(options, *plugins);
@@ -169,6 +178,7 @@ int run(const RunOptions& options) {
   const auto log = loggers(checked.config.container.name);
   warn_of_default_calibration(checked.probed.components, *log);
   warn_of_unrecorded_inputs(checked.probed.components, *log);
+  remind_of_other_containers(options, checked.config.container, *log);
   return run_container(std::move(checked), plugins, loggers);
 }
 

@@ -236,6 +236,18 @@ TEST_F(CommandRun, LockstepEndsWhenWhoItWaitsForHasStopped) {
               HasSubstr("lockstep waits for reporter (stopped after an error: bad frame)"));
 }
 
+TEST_F(CommandRun, LockstepOfOneContainerRemindsOfTheOther) {
+  run("container: {name: rig, external_topics: [/camvox/local_map, /camvox/map_update]}\n"
+      "components:\n"
+      "  - {plugin: test::FrameReporter, name: reporter}\n"
+      "  - {plugin: test::LockstepReplay, name: replay}\n",
+      {"--lockstep"});
+  EXPECT_THAT(container_->output(),
+              HasSubstr("--lockstep: the container that publishes /camvox/local_map, "
+                        "/camvox/map_update must run with it, too"));
+  EXPECT_EQ(stop(), 0) << container_->output();
+}
+
 TEST_F(CommandRun, LockstepCountsTheFramesThatSyncReads) {
   const auto bag = bag_of("front", "/front/jpeg");
   const auto print =
