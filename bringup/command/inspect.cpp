@@ -105,8 +105,7 @@ void keep_apart(SystemConfig& config, const ProbedSystem& probed, const std::str
   for (std::size_t i = 0; i < config.components.size(); ++i) {
     auto& component = config.components[i];
     if (component.plugin != kReplay) continue;
-    const auto own = std::get<std::vector<std::string>>(
-        probed.components[i].effective_parameters.at("remap").value);
+    const auto own = probed.components[i].value<std::vector<std::string>>("remap");
     std::vector<std::string> rules;
     for (const auto& topic : (*reader)->topics()) {
       rules.push_back(topic.name + ":=" + prefix + replayed_as(topic.name, own));

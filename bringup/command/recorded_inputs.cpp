@@ -17,15 +17,6 @@ using Names = std::vector<std::string>;
 /// Sensor inputs by their ports; an image may come in either way.
 const std::vector<Names> kInputs = {{"image", "compressed_image"}, {"lidar"}, {"imu"}, {"depth"}};
 
-template <typename T>
-T value_of(const ProbedComponent& component, const std::string& key) {
-  const auto found = component.effective_parameters.find(key);
-  const auto* value = found == component.effective_parameters.end()
-                          ? nullptr
-                          : std::get_if<T>(&found->second.value);
-  return value != nullptr ? *value : T{};
-}
-
 /// Of an input, those topics that other processes publish.
 Names topics_of(const ProbedComponent& component, const Names& input) {
   Names topics;
@@ -61,15 +52,15 @@ void warn(const std::vector<ProbedComponent>& components,
 
 void warn_of_unrecorded_inputs(const std::vector<ProbedComponent>& components, Logger& log) {
   for (const auto& replay : components) {
-    const auto bag = value_of<std::string>(replay, "bag");
+    const auto bag = replay.value<std::string>("bag");
     if (bag.empty()) continue;
     const auto reader = storage::BagReader::open(bag);
     if (!reader.ok()) continue;  // replay says why
-    const auto only = value_of<Names>(replay, "topics");
+    const auto only = replay.value<Names>("topics");
     std::set<std::string> published;
     for (const auto& topic : (*reader)->topics()) {
       if (!only.empty() && std::find(only.begin(), only.end(), topic.name) == only.end()) continue;
-      published.insert(bringup::replayed_as(topic.name, value_of<Names>(replay, "remap")));
+      published.insert(bringup::replayed_as(topic.name, replay.value<Names>("remap")));
     }
     warn(components, bag, published, log);
   }

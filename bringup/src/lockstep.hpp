@@ -1,6 +1,5 @@
 #pragma once
 
-#include <string>
 #include <string_view>
 #include <vector>
 
@@ -10,15 +9,6 @@
 namespace camvox::bringup {
 
 constexpr auto kLockstepComponents = "lockstep_components";
-
-/// A parameter as it takes effect; T{} if the component has none of this name and type.
-template <typename T>
-T value_of(const ProbedComponent& component, const std::string& key) {
-  const auto found = component.effective_parameters.find(key);
-  if (found == component.effective_parameters.end()) return {};
-  const auto* value = std::get_if<T>(&found->second.value);
-  return value != nullptr ? *value : T{};
-}
 
 /// Null if the component has no such port.
 [[nodiscard]] const ProbedPort* find_port(const ProbedComponent& component, std::string_view name);

@@ -33,10 +33,10 @@ void check_offset(const ProbedComponent& replay,
                   std::vector<Problem>& problems) {
   const auto own = replay.effective_parameters.find(kOffsetKey);
   if (own == replay.effective_parameters.end()) return;
-  const auto offset_ns = value_of<std::int64_t>(replay, kOffsetKey);
+  const auto offset_ns = replay.value<std::int64_t>(kOffsetKey);
   for (const auto& component : components) {
     if (!component.effective_parameters.contains(kOffsetKey)) continue;
-    const auto other_ns = value_of<std::int64_t>(component, kOffsetKey);
+    const auto other_ns = component.value<std::int64_t>(kOffsetKey);
     if (other_ns == offset_ns) continue;
     const auto& other = component.effective_parameters.at(kOffsetKey);
     const bool given = own->second.location.to_string() != "default";
@@ -63,7 +63,7 @@ std::vector<Problem> check_components(const SystemConfig& config,
                         replay.name + ".parameters." + kLockstepComponents,
                         message});
   };
-  const auto waited_for = value_of<std::vector<std::string>>(replay, kLockstepComponents);
+  const auto waited_for = replay.value<std::vector<std::string>>(kLockstepComponents);
   if (waited_for.empty()) report("lockstep has nobody to wait for: it would drop most frames");
   for (const auto& name : waited_for) {
     const auto found = std::find(names.begin(), names.end(), name) - names.begin();
@@ -94,7 +94,7 @@ std::vector<Problem> check_lockstep(const SystemConfig& config,
   std::vector<Problem> problems;
   for (const auto& replay : components) {
     const auto* progress = find_port(replay, ProgressReporter::kFrames.name);
-    if (progress == nullptr || !value_of<bool>(replay, "lockstep")) continue;
+    if (progress == nullptr || !replay.value<bool>("lockstep")) continue;
     check_offset(replay, components, problems);
     if (!replay.effective_parameters.contains(kLockstepComponents)) continue;
     for (auto found : {check_components(config, components, replay, progress->topic),

@@ -82,16 +82,15 @@ bool give_lockstep_defaults(const std::vector<ProbedComponent>& components,
                             const ProbedComponent& replay,
                             ComponentConfig& config) {
   const auto* progress = find_port(replay, ProgressReporter::kFrames.name);
-  if (progress == nullptr || progress->is_output || !value_of<bool>(replay, "lockstep"))
-    return false;
+  if (progress == nullptr || progress->is_output || !replay.value<bool>("lockstep")) return false;
   bool given = false;
   if (!config.parameters.contains(kLockstepComponents)) {
     config.parameters[kLockstepComponents] = derived(frame_reporters(components, progress->topic));
     given = true;
   }
   if (config.parameters.contains(kTopicKey)) return given;
-  const auto frames = recorded_frames(recorded_topics(value_of<std::string>(replay, "bag")),
-                                      value_of<Names>(replay, "remap"),
+  const auto frames = recorded_frames(recorded_topics(replay.value<std::string>("bag")),
+                                      replay.value<Names>("remap"),
                                       frame_topics(components));
   if (frames) config.parameters[kTopicKey] = derived(*frames);
   return given || frames.has_value();
@@ -99,9 +98,9 @@ bool give_lockstep_defaults(const std::vector<ProbedComponent>& components,
 
 std::vector<Problem> check_lockstep_topic(const std::vector<ProbedComponent>& components,
                                           const ProbedComponent& replay) {
-  const auto bag = value_of<std::string>(replay, "bag");
+  const auto bag = replay.value<std::string>("bag");
   const auto recorded = recorded_topics(bag);
-  const auto topic = value_of<std::string>(replay, kTopicKey);
+  const auto topic = replay.value<std::string>(kTopicKey);
   if (recorded.empty() || topic.empty() || holds_frames(recorded, topic)) return {};
   const auto& parameter = replay.effective_parameters.at(kTopicKey);
   const auto key = replay.name + ".parameters." + kTopicKey;

@@ -60,6 +60,17 @@ TEST(Probe, ParameterProblemsNameFileLineAndKey) {
                   "rig.yaml:8: sink.parameters.mode: \"medium\" must be one of fast, slow"));
 }
 
+TEST(Probe, ParametersAreAskedForByNameAndType) {
+  const auto system =
+      probe("components:\n" + kPoseSource +
+            "  - {plugin: test::PoseSink, name: sink, parameters: {limit_m: 2.0}}\n");
+  const auto& sink = system.components.at(1);
+  EXPECT_EQ(sink.value<double>("limit_m"), 2.0);
+  EXPECT_EQ(sink.value<std::int64_t>("ransac.count"), 3) << "the default";
+  EXPECT_EQ(sink.value<std::string>("limit_m"), "");
+  EXPECT_EQ(sink.value<bool>("unheard_of"), false);
+}
+
 TEST(Probe, ParametersOfAComponentWithoutAnyAreAnError) {
   EXPECT_THAT(problems_of("  - {plugin: test::PoseSource, name: source, parameters: {x: 1}}\n"),
               ElementsAre("rig.yaml:2: source.parameters.x: the component takes no parameters"));

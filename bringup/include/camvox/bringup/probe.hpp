@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "camvox/bringup/plugin_loader.hpp"
@@ -27,6 +28,15 @@ struct ProbedComponent {
   ParameterMap effective_parameters;  ///< Defaults included; origin "default" or from the file.
   std::vector<Problem> problems;      ///< Parameters, unknown ports, a constructor that throws.
   bool constructed = false;           ///< If not, what else it would have asked for is not known.
+
+  /// A parameter as it takes effect; T{} if the component has none of this name and type.
+  template <typename T>
+  [[nodiscard]] T value(const std::string& key) const {
+    const auto found = effective_parameters.find(key);
+    if (found == effective_parameters.end()) return {};
+    const auto* value = std::get_if<T>(&found->second.value);
+    return value != nullptr ? *value : T{};
+  }
 };
 
 /// Constructs and destroys a component on a recording context.
