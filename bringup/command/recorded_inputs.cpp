@@ -5,8 +5,7 @@
 #include <algorithm>
 #include <set>
 #include <string>
-
-#include "camvox/storage/bag_reader.hpp"
+#include <vector>
 
 namespace camvox::command {
 namespace {
@@ -50,19 +49,17 @@ void warn(const std::vector<ProbedComponent>& components,
 
 }  // namespace
 
-void warn_of_unrecorded_inputs(const std::vector<ProbedComponent>& components, Logger& log) {
-  for (const auto& replay : components) {
-    const auto bag = replay.value<std::string>("bag");
-    if (bag.empty()) continue;
-    const auto reader = storage::BagReader::open(bag);
-    if (!reader.ok()) continue;  // replay says why
+void warn_of_unrecorded_inputs(const bringup::ProbedSystem& system, Logger& log) {
+  for (const auto& replay : system.components) {
+    const auto* recorded = system.recording_of(replay);
+    if (recorded == nullptr) continue;
     const auto only = replay.value<Names>("topics");
     std::set<std::string> published;
-    for (const auto& topic : (*reader)->topics()) {
-      if (!only.empty() && std::find(only.begin(), only.end(), topic.name) == only.end()) continue;
-      published.insert(bringup::replayed_as(topic.name, replay.value<Names>("remap")));
+    for (const auto& topic : *recorded) {
+      if (!only.empty() && std::find(only.begin(), only.end(), topic) == only.end()) continue;
+      published.insert(bringup::replayed_as(topic, replay.value<Names>("remap")));
     }
-    warn(components, bag, published, log);
+    warn(system.components, replay.value<std::string>("bag"), published, log);
   }
 }
 

@@ -177,7 +177,7 @@ int run(const RunOptions& options) {
   const auto loggers = console_loggers(parse_log_level(checked.config.container.log_level));
   const auto log = loggers(checked.config.container.name);
   warn_of_default_calibration(checked.probed.components, *log);
-  warn_of_unrecorded_inputs(checked.probed.components, *log);
+  warn_of_unrecorded_inputs(checked.probed, *log);
   remind_of_other_containers(options, checked.config.container, *log);
   return run_container(std::move(checked), plugins, loggers);
 }

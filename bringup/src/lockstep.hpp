@@ -13,9 +13,8 @@ constexpr auto kLockstepComponents = "lockstep_components";
 /// Null if the component has no such port.
 [[nodiscard]] const ProbedPort* find_port(const ProbedComponent& component, std::string_view name);
 
-/// Frames that the recording does not hold cannot hold the replay back. A bag that cannot be read
-/// is no problem here: replay says so when it starts.
-[[nodiscard]] std::vector<Problem> check_lockstep_topic(
-    const std::vector<ProbedComponent>& components, const ProbedComponent& replay);
+/// Frames that the recording does not hold cannot hold the replay back.
+[[nodiscard]] std::vector<Problem> check_lockstep_topic(const ProbedSystem& system,
+                                                        const ProbedComponent& replay);
 
 }  // namespace camvox::bringup

@@ -89,16 +89,15 @@ const ProbedPort* find_port(const ProbedComponent& component, std::string_view n
   return found == component.ports.end() ? nullptr : &*found;
 }
 
-std::vector<Problem> check_lockstep(const SystemConfig& config,
-                                    const std::vector<ProbedComponent>& components) {
+std::vector<Problem> check_lockstep(const SystemConfig& config, const ProbedSystem& system) {
   std::vector<Problem> problems;
-  for (const auto& replay : components) {
+  for (const auto& replay : system.components) {
     const auto* progress = find_port(replay, ProgressReporter::kFrames.name);
     if (progress == nullptr || !replay.value<bool>("lockstep")) continue;
-    check_offset(replay, components, problems);
+    check_offset(replay, system.components, problems);
     if (!replay.effective_parameters.contains(kLockstepComponents)) continue;
-    for (auto found : {check_components(config, components, replay, progress->topic),
-                       check_lockstep_topic(components, replay)}) {
+    for (auto found : {check_components(config, system.components, replay, progress->topic),
+                       check_lockstep_topic(system, replay)}) {
       problems.insert(problems.end(), found.begin(), found.end());
     }
   }

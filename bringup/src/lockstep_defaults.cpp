@@ -6,7 +6,6 @@
 
 #include "camvox/bringup/probe.hpp"
 #include "camvox/component/progress.hpp"
-#include "camvox/storage/bag_reader.hpp"
 #include "lockstep.hpp"
 
 namespace camvox::bringup {
@@ -40,15 +39,6 @@ Names frame_topics(const std::vector<ProbedComponent>& components) {
   return topics;
 }
 
-Names recorded_topics(const std::string& bag) {
-  Names names;
-  if (bag.empty()) return names;
-  const auto reader = storage::BagReader::open(bag);
-  if (!reader.ok()) return names;  // replay says why
-  for (const auto& topic : (*reader)->topics()) names.push_back(topic.name);
-  return names;
-}
-
 std::optional<std::string> recorded_frames(const Names& recorded,
                                            const Names& rules,
                                            const Names& read) {
@@ -78,34 +68,36 @@ std::string replayed_as(const std::string& topic, const std::vector<std::string>
   return topic;
 }
 
-bool give_lockstep_defaults(const std::vector<ProbedComponent>& components,
+bool give_lockstep_defaults(const ProbedSystem& system,
                             const ProbedComponent& replay,
                             ComponentConfig& config) {
   const auto* progress = find_port(replay, ProgressReporter::kFrames.name);
   if (progress == nullptr || progress->is_output || !replay.value<bool>("lockstep")) return false;
   bool given = false;
   if (!config.parameters.contains(kLockstepComponents)) {
-    config.parameters[kLockstepComponents] = derived(frame_reporters(components, progress->topic));
+    config.parameters[kLockstepComponents] =
+        derived(frame_reporters(system.components, progress->topic));
     given = true;
   }
-  if (config.parameters.contains(kTopicKey)) return given;
-  const auto frames = recorded_frames(recorded_topics(replay.value<std::string>("bag")),
-                                      replay.value<Names>("remap"),
-                                      frame_topics(components));
+  const auto* recorded = system.recording_of(replay);
+  if (recorded == nullptr || config.parameters.contains(kTopicKey)) return given;
+  const auto frames =
+      recorded_frames(*recorded, replay.value<Names>("remap"), frame_topics(system.components));
   if (frames) config.parameters[kTopicKey] = derived(*frames);
   return given || frames.has_value();
 }
 
-std::vector<Problem> check_lockstep_topic(const std::vector<ProbedComponent>& components,
+std::vector<Problem> check_lockstep_topic(const ProbedSystem& system,
                                           const ProbedComponent& replay) {
-  const auto bag = replay.value<std::string>("bag");
-  const auto recorded = recorded_topics(bag);
+  const auto* recorded = system.recording_of(replay);
+  if (recorded == nullptr || recorded->empty()) return {};
   const auto topic = replay.value<std::string>(kTopicKey);
-  if (recorded.empty() || topic.empty() || holds_frames(recorded, topic)) return {};
+  if (topic.empty() || holds_frames(*recorded, topic)) return {};
   const auto& parameter = replay.effective_parameters.at(kTopicKey);
   const auto key = replay.name + ".parameters." + kTopicKey;
-  const auto holds = fmt::format("{} holds {}", bag, fmt::join(recorded, ", "));
-  const auto read = frame_topics(components);
+  const auto holds =
+      fmt::format("{} holds {}", replay.value<std::string>("bag"), fmt::join(*recorded, ", "));
+  const auto read = frame_topics(system.components);
   if (parameter.location.to_string() != "default" || read.empty())
     return {{parameter.location, key, fmt::format("no frames on {}: {}", topic, holds)}};
   return {{replay.effective_parameters.at("bag").location,

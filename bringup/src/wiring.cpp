@@ -4,6 +4,7 @@
 #include <set>
 
 #include "camvox/bringup/probe.hpp"
+#include "camvox/storage/bag_reader.hpp"
 
 namespace camvox::bringup {
 namespace {
@@ -154,16 +155,32 @@ std::vector<Problem> problems_of(const std::vector<ProbedComponent>& components)
   return problems;
 }
 
+void read_recordings(ProbedSystem& system) {
+  for (const auto& replay : system.components) {
+    const auto bag = replay.value<std::string>("bag");
+    if (bag.empty() || system.recordings.contains(bag)) continue;
+    const auto reader = storage::BagReader::open(bag);
+    if (!reader.ok()) continue;
+    auto& topics = system.recordings[bag];
+    for (const auto& topic : (*reader)->topics()) topics.push_back(topic.name);
+  }
+}
+
 /// Needs all components, so it comes after each of them was probed.
 void complete_lockstep(SystemConfig& config, PluginLoader& plugins, ProbedSystem& system) {
   for (std::size_t i = 0; i < config.components.size(); ++i) {
     auto& probed = system.components[i];
-    if (!give_lockstep_defaults(system.components, probed, config.components[i])) continue;
+    if (!give_lockstep_defaults(system, probed, config.components[i])) continue;
     probed = probe_plugin(config.components[i], plugins);
   }
 }
 
 }  // namespace
+
+const std::vector<std::string>* ProbedSystem::recording_of(const ProbedComponent& replay) const {
+  const auto found = recordings.find(replay.value<std::string>("bag"));
+  return found == recordings.end() ? nullptr : &found->second;
+}
 
 std::vector<Problem> check_wiring(const SystemConfig& config,
                                   const std::vector<ProbedComponent>& components,
@@ -182,14 +199,17 @@ ProbedSystem probe_system(SystemConfig& config, PluginLoader& plugins) {
     system.components.push_back(std::move(probed));
   }
   const bool complete = all_complete(system.components);
-  if (complete) complete_lockstep(config, plugins, system);
+  if (complete) {
+    read_recordings(system);
+    complete_lockstep(config, plugins, system);
+  }
   system.problems = problems_of(system.components);
   if (complete) {
     const auto unused = unused_shared_parameters(config, system.components);
     system.problems.insert(system.problems.end(), unused.begin(), unused.end());
     const auto wiring = check_wiring(config, system.components);
     system.problems.insert(system.problems.end(), wiring.begin(), wiring.end());
-    const auto lockstep = check_lockstep(config, system.components);
+    const auto lockstep = check_lockstep(config, system);
     system.problems.insert(system.problems.end(), lockstep.begin(), lockstep.end());
   }
   sort_problems(system.problems);

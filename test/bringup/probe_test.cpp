@@ -201,6 +201,31 @@ TEST(Probe, LockstepMayWaitForAnotherContainer) {
               IsEmpty());
 }
 
+/// A bag that is not there: all that is known of it is what the probing has seen.
+TEST(Probe, LockstepLooksAtARecordingNoSecondTime) {
+  ProbedSystem system;
+  system.recordings["/no/such/bag"] = {"/imu", "/front/jpeg"};
+  system.components.push_back(
+      {"sync", {{"compressed_image", "/front/jpeg", "sensor_msgs/msg/CompressedImage"}}, {}, {}});
+  ProbedComponent replay{
+      "replay", {{"progress", "/camvox/progress", "camvox_interfaces/msg/Progress"}}, {}, {}};
+  replay.effective_parameters["bag"] = {std::string("/no/such/bag"), {}};
+  replay.effective_parameters["lockstep"] = {true, {}};
+  ComponentConfig config;
+  EXPECT_TRUE(give_lockstep_defaults(system, replay, config));
+  EXPECT_EQ(config.parameters.at("lockstep_topic").value,
+            config::Value(std::string("/front/jpeg")));
+
+  replay.effective_parameters["lockstep_components"] = {std::vector<std::string>{"sync"}, {}};
+  replay.effective_parameters["lockstep_topic"] = {std::string("/back/jpeg"), {"rig.yaml", 7}};
+  system.components.push_back(replay);
+  std::vector<std::string> texts;
+  for (const auto& problem : check_lockstep({}, system)) texts.push_back(problem.to_string());
+  EXPECT_THAT(texts,
+              ::testing::Contains("rig.yaml:7: replay.parameters.lockstep_topic: no frames on "
+                                  "/back/jpeg: /no/such/bag holds /imu, /front/jpeg"));
+}
+
 /// Reports come in lidar time: the replay must know what lies between that and an image's stamp.
 TEST(Probe, LockstepNeedsTheTimeOffsetOfWhoReports) {
   const std::string reporter =

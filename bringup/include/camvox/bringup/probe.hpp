@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <memory>
 #include <string>
 #include <variant>
@@ -47,6 +48,13 @@ struct ProbedComponent {
 struct ProbedSystem {
   std::vector<ProbedComponent> components;  ///< In the order of the config.
   std::vector<Problem> problems;            ///< Sorted by line, each once.
+  /// Topics of each bag that is replayed, by the bag; looked at once, as one without an index takes
+  /// long.
+  std::map<std::string, std::vector<std::string>> recordings;
+
+  /// Topics of what the component replays. Null if that is nothing, or a bag that cannot be read:
+  /// replay says why when it starts.
+  [[nodiscard]] const std::vector<std::string>* recording_of(const ProbedComponent& replay) const;
 };
 
 /// Checks everything that the file alone does not tell: plugins, parameters, ports, wiring. Shared
@@ -80,14 +88,14 @@ enum class MissingWriters { kForbidden, kAllowed };
 /// Gives a replay in lockstep what it was not told: whom to wait for (everyone here who reports
 /// each frame), and under which name the recording holds the images that somebody here reads. True
 /// if there was something; it must then be probed again.
-bool give_lockstep_defaults(const std::vector<ProbedComponent>& components,
+bool give_lockstep_defaults(const ProbedSystem& system,
                             const ProbedComponent& replay,
                             ComponentConfig& config);
 
 /// A recording without the frames that lockstep counts, and components that a replay shall wait for
 /// and that do not report each frame.
 [[nodiscard]] std::vector<Problem> check_lockstep(const SystemConfig& config,
-                                                  const std::vector<ProbedComponent>& components);
+                                                  const ProbedSystem& system);
 
 /// The config as it takes effect, all defaults filled in, as a config file with the origin of
 /// each value as a comment.
