@@ -5,7 +5,6 @@
 #include <chrono>
 #include <cmath>
 
-#include "camvox/component/earlier_runs.hpp"
 #include "camvox/interfaces/header.hpp"
 
 namespace camvox {
@@ -41,7 +40,7 @@ SyncComponent::SyncComponent(Context& context)
                      static_cast<std::size_t>(config_.sync.max_pending_frames)),
       stationary_(config_.stationary),
       progress_(context),
-      next_frame_id_((earlier_runs(context) << kBitsOfRun) + 1) {
+      next_frame_id_((context.earlier_runs() << kBitsOfRun) + 1) {
   const int loans = config_.sync.max_pending_frames + 2;
   frame_images_ = context.advertise<FrameImage>({"frame_image", topics::kFrameImage},
                                                 {.qos = qos::kFrames, .max_loans = loans});

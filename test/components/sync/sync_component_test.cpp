@@ -101,6 +101,16 @@ TEST_F(SyncTest, PairsAnImageWithTheReturnsBeforeIt) {
   EXPECT_EQ(images()[0]->data_count(), kWidth * kHeight);
 }
 
+TEST_F(SyncTest, IdsGoOnFarAboveThoseOfTheRunBefore) {
+  fake_.set_earlier_runs(2);
+  make();
+  scan_at(0);
+  imu_between(0, 300);
+  image_at(100);
+  ASSERT_EQ(images().size(), 1U);
+  EXPECT_EQ(images()[0]->header().frame_id(), (std::uint64_t{2} << 32U) + 1);
+}
+
 // Defect 11 of CamVox: the image there gets the stamp of the scan before.
 TEST_F(SyncTest, KeepsTheImagesOwnStampWhateverThePhaseOfTheScans) {
   make();

@@ -95,6 +95,9 @@ class Context {
 
   /// The component's name in the config.
   [[nodiscard]] virtual const std::string& name() const = 0;
+  /// How many components of this name the container has had before: 0 at first, then one more with
+  /// each restart or load. For numbers that others compare and that must therefore not begin anew.
+  [[nodiscard]] virtual std::uint64_t earlier_runs() const { return 0; }
   [[nodiscard]] virtual Logger& log() = 0;
   [[nodiscard]] virtual Diagnostics& diagnostics() = 0;
   /// Wall clock, or the time of /clock when `use_sim_time` is set; ns since the epoch.

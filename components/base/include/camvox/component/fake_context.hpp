@@ -41,6 +41,8 @@ class FakeContext final : public Context, public RestartMemory {
 
   /// Gives a parameter, before the component is made.
   void set_parameter(std::string_view key, config::Value value);
+  /// What earlier_runs() tells the component, which is made after; 0 unless set.
+  void set_earlier_runs(std::uint64_t count) { earlier_runs_ = count; }
   /// Changes parameters as `camvox param set` does. Returns what is wrong; then nothing changed.
   [[nodiscard]] std::vector<config::Problem> change_parameters(const config::ParameterMap& changes);
   [[nodiscard]] const config::ParameterMap& effective_parameters() const { return effective_; }
@@ -114,6 +116,7 @@ class FakeContext final : public Context, public RestartMemory {
   void verify_nothing_left() const;
 
   [[nodiscard]] const std::string& name() const override { return name_; }
+  [[nodiscard]] std::uint64_t earlier_runs() const override { return earlier_runs_; }
   [[nodiscard]] Logger& log() override;
   [[nodiscard]] Diagnostics& diagnostics() override { return diagnostics_; }
   [[nodiscard]] std::int64_t now_ns() const override { return now_ns_; }
@@ -187,6 +190,7 @@ class FakeContext final : public Context, public RestartMemory {
 
   std::string name_;
   std::int64_t now_ns_;
+  std::uint64_t earlier_runs_ = 0;
   bool exit_requested_ = false;
   bool all_idle_ = true;
   std::any restart_memory_;

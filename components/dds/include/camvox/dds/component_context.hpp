@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "camvox/component/context.hpp"
-#include "camvox/component/earlier_runs.hpp"
 #include "camvox/component/restart_memory.hpp"
 #include "camvox/dds/executor.hpp"
 #include "camvox/dds/participant.hpp"
@@ -45,7 +44,7 @@ struct ComponentSettings {
   std::string name;
   config::ParameterMap parameters;
   std::map<std::string, std::string, std::less<>> remap;  ///< Port name -> topic name.
-  std::uint64_t earlier_runs = 0;                         ///< See camvox::earlier_runs.
+  std::uint64_t earlier_runs = 0;                         ///< See Context.
   /// See camvox::restart_memory.
   std::shared_ptr<std::any> restart_memory = std::make_shared<std::any>();
 };
@@ -78,7 +77,7 @@ struct UnsentCount {
 
 /// Context over Fast DDS. Endpoints are made while the component is constructed, but nothing is
 /// delivered before `activate`.
-class ComponentContext final : public Context, public RunCounter, public RestartMemory {
+class ComponentContext final : public Context, public RestartMemory {
  public:
   /// `on_error` gets each exception that leaves a callback, on the executor's thread.
   ComponentContext(ComponentSettings settings,
