@@ -4,8 +4,7 @@
 
 #include <cmath>
 
-#include "camvox/component/fake_context.hpp"
-#include "sensor_streams.hpp"
+#include "sync_fixture.hpp"
 
 namespace camvox {
 namespace {
@@ -18,64 +17,17 @@ using livox_ros_driver2::msg::CustomMsg;
 using sensor_msgs::msg::Image;
 using test::grey_image;
 using test::imu_message;
+using test::kHeight;
 using test::kMs;
 using test::kStart_ns;
+using test::kWidth;
 using test::livox_message;
+using test::SyncTest;
 using ::testing::HasSubstr;
-
-constexpr std::uint32_t kWidth = 64, kHeight = 48;
-
-class SyncTest : public ::testing::Test {
- protected:
-  SyncTest() : fake_("sync") {
-    fake_.set_now_ns(kStart_ns);
-    fake_.set_parameter("camera.width_px", std::int64_t{kWidth});
-    fake_.set_parameter("camera.height_px", std::int64_t{kHeight});
-  }
-
-  void make() { component_ = std::make_unique<SyncComponent>(fake_); }
-  void image_at(std::int64_t ms, std::uint8_t brightness = 100) {
-    fake_.send("image", grey_image(kStart_ns + ms * kMs, kWidth, kHeight, brightness));
-  }
-  void scan_at(std::int64_t ms, std::int64_t duration_ms = 100) {
-    fake_.send("lidar", livox_message(kStart_ns + ms * kMs, duration_ms * kMs));
-  }
-  void imu_between(std::int64_t first_ms, std::int64_t last_ms, double force_z = 9.81) {
-    for (std::int64_t ms = first_ms; ms <= last_ms; ms += 5) {
-      fake_.send("imu", imu_message(kStart_ns + ms * kMs, force_z));
-    }
-  }
-  [[nodiscard]] std::vector<std::shared_ptr<const Scan>> scans() const {
-    return fake_.published<Scan>("scan");
-  }
-  [[nodiscard]] std::vector<std::shared_ptr<const FrameImage>> images() const {
-    return fake_.published<FrameImage>("frame_image");
-  }
-  [[nodiscard]] std::uint64_t counter(const std::string& name) {
-    fake_.advance(std::chrono::seconds(1));
-    return std::stoull(fake_.diagnostics().status().values.at(name));
-  }
-
-  FakeContext fake_;
-  std::unique_ptr<SyncComponent> component_;
-};
 
 /// Time of a return in ms after the start, as livox_message wrote it into x.
 double time_ms(const Scan& scan, std::size_t i) {
   return static_cast<double>(scan.points()[i][0]) - 1000.0;
-}
-
-TEST_F(SyncTest, NamesTheInputThatNothingCameOn) {
-  make();
-  image_at(100);
-  scan_at(0);
-  for (int second = 0; second < 4; ++second) fake_.advance(std::chrono::seconds(1));
-  EXPECT_TRUE(fake_.log_entries().empty()) << "a driver may start late";
-  fake_.advance(std::chrono::seconds(1));
-  component_->stop();
-  ASSERT_EQ(fake_.log_entries().size(), 2U);
-  EXPECT_THAT(fake_.log_entries()[0].text, HasSubstr("input 'imu' (topic /livox/imu "));
-  EXPECT_THAT(fake_.log_entries()[1].text, HasSubstr("images: 1 came, of which 1 "));
 }
 
 TEST_F(SyncTest, PairsAnImageWithTheReturnsBeforeIt) {
