@@ -58,6 +58,11 @@ Logger& ProbeContext::log() {
   return logger;
 }
 
+std::string ProbeContext::topic_of(const Port& port) const {
+  const auto remapped = config_.remap.find(port.name);
+  return remapped != config_.remap.end() ? remapped->second.topic : std::string(port.default_topic);
+}
+
 void ProbeContext::every(std::chrono::nanoseconds period, std::function<void()>) {
   if (period.count() <= 0) throw std::invalid_argument("Context::every needs a period above zero");
 }
@@ -82,11 +87,9 @@ void ProbeContext::accept_parameters(ParameterMap effective, std::vector<Problem
 
 void ProbeContext::record(
     const Port& port, std::string_view type_name, bool internal, bool is_output, bool required) {
-  const auto remapped = config_.remap.find(port.name);
-  const std::string topic =
-      remapped != config_.remap.end() ? remapped->second.topic : std::string(port.default_topic);
+  const auto topic = topic_of(port);
   if (const auto problem = topics::name_problem(topic);
-      !problem.empty() && remapped == config_.remap.end()) {
+      !problem.empty() && !config_.remap.contains(port.name)) {
     report(config_.location, "remap." + std::string(port.name), problem);
   }
   result_.ports.push_back(

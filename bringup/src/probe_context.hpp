@@ -13,6 +13,7 @@ class ProbeContext final : public Context {
   [[nodiscard]] Logger& log() override;
   [[nodiscard]] Diagnostics& diagnostics() override { return diagnostics_; }
   [[nodiscard]] std::int64_t now_ns() const override { return 0; }
+  [[nodiscard]] std::string topic_of(const Port& port) const override;
   void every(std::chrono::nanoseconds period, std::function<void()> callback) override;
   void post(std::function<void()> callback) override;
 

@@ -76,6 +76,11 @@ void FakeContext::set_parameter(std::string_view key, config::Value value) {
   given_.insert_or_assign(std::string(key), config::Parameter{std::move(value), {"test", 0}});
 }
 
+std::string FakeContext::topic_of(const Port& port) const {
+  const auto remapped = remap_.find(port.name);
+  return remapped != remap_.end() ? remapped->second : Context::topic_of(port);
+}
+
 void FakeContext::accept_parameters(config::ParameterMap effective,
                                     std::vector<config::Problem> problems) {
   if (!problems.empty()) throw config::ConfigError(std::move(problems));

@@ -1,5 +1,7 @@
 #include "camvox/sync_component/sync_component.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -22,8 +24,21 @@ constexpr Qos kImageReader{16, false, false};
 constexpr Qos kLidarReader{256, false, false};
 constexpr Qos kImuReader{2000, false, false};
 
+constexpr Port kImage{"image", topics::kImage};
+constexpr Port kCompressedImage{"compressed_image", topics::kCompressedImage};
+constexpr Port kLidar{"lidar", topics::kLidar};
+constexpr Port kImu{"imu", topics::kImu};
+constexpr Port kDepth{"depth", topics::kRegisteredDepth};
+
 constexpr int kLooksBeforeMissing = 5;  // one a second
 constexpr int kBitsOfRun = 32;          // frames of a run, before a restart: four years at 30 Hz
+
+/// An image may come in either way.
+std::vector<Port> image_ports(const std::string& transport) {
+  if (transport == "raw") return {kImage};
+  if (transport == "compressed") return {kCompressedImage};
+  return {kImage, kCompressedImage};
+}
 
 double seconds(std::int64_t time_ns) { return 1e-9 * static_cast<double>(time_ns); }
 
@@ -71,17 +86,16 @@ void SyncComponent::stop() {
 /// Says once which inputs nothing has come on: in a recording they may just not be there.
 void SyncComponent::tell_missing_inputs(bool at_end) {
   struct Input {
-    const char* name;
-    std::string_view topic;
+    std::vector<Port> ports;  // any of them
     bool used;
     std::uint64_t received;
   };
   const auto& imu = assembler_.imu().counters();
   const std::array inputs = {
-      Input{"image", topics::kImage, true, assembler_.image_counters().received},
-      Input{"lidar", topics::kLidar, has_lidar(), assembler_.lidar().counters().received},
-      Input{"imu", topics::kImu, has_lidar() && config_.sync.use_imu, imu.received},
-      Input{"depth", topics::kRegisteredDepth, !has_lidar(), depth_pairing_.counters().received}};
+      Input{image_ports(config_.image_transport), true, assembler_.image_counters().received},
+      Input{{kLidar}, has_lidar(), assembler_.lidar().counters().received},
+      Input{{kImu}, has_lidar() && config_.sync.use_imu, imu.received},
+      Input{{kDepth}, !has_lidar(), depth_pairing_.counters().received}};
   const auto came = [](const Input& input) { return input.used && input.received > 0; };
   const bool any = std::any_of(inputs.begin(), inputs.end(), came);
   if (missing_told_ || (!any && !at_end)) return;
@@ -89,22 +103,21 @@ void SyncComponent::tell_missing_inputs(bool at_end) {
   missing_told_ = true;
   for (const auto& input : inputs) {
     if (!input.used || input.received > 0) continue;
+    std::vector<std::string> read;
+    for (const auto& port : input.ports) read.push_back(context_.topic_of(port));
     context_.log().warn(
-        "nothing came on input '{}' (topic {}{} unless remapped)",
-        input.name,
-        input.topic,
-        input.topic == topics::kImage ? " or " + std::string(topics::kCompressedImage) : "");
+        "nothing came on input '{}' (topic {})", input.ports.front().name, fmt::join(read, " or "));
   }
 }
 
 void SyncComponent::subscribe_camera() {
   if (config_.image_transport != "compressed") {
-    context_.subscribe<Image>({"image", topics::kImage},
+    context_.subscribe<Image>(kImage,
                               [this](const auto& image) { on_image(*image); },
                               {.qos = kImageReader, .required = false});
   }
   if (config_.image_transport != "raw") {
-    context_.subscribe<CompressedImage>({"compressed_image", topics::kCompressedImage},
+    context_.subscribe<CompressedImage>(kCompressedImage,
                                         [this](const auto& image) { on_image(*image); },
                                         {.qos = kImageReader, .required = false});
   }
@@ -121,30 +134,28 @@ void SyncComponent::subscribe_camera() {
 
 void SyncComponent::subscribe_depth_source() {
   if (!has_lidar()) {
-    context_.subscribe<Image>({"depth", topics::kRegisteredDepth},
+    context_.subscribe<Image>(kDepth,
                               [this](const auto& image) { on_depth(*image); },
                               {.qos = kImageReader, .required = false});
     return;
   }
   SubscribeOptions options{.qos = kLidarReader, .required = false};
-  const Port port{"lidar", topics::kLidar};
   if (config_.depth_source == "point_cloud") {
     context_.subscribe<PointCloud2>(
-        port,
+        kLidar,
         [this](const auto& cloud) { on_lidar(*cloud, sync_component::read_point_cloud); },
         options);
   } else {
     if (config_.depth_source == "livox_interfaces")
       options.type_name = "livox_interfaces/msg/CustomMsg";
     context_.subscribe<CustomMsg>(
-        port,
+        kLidar,
         [this](const auto& message) { on_lidar(*message, sync_component::read_livox); },
         options);
   }
   if (!config_.sync.use_imu) return;
-  context_.subscribe<Imu>({"imu", topics::kImu},
-                          [this](const auto& imu) { on_imu(*imu); },
-                          {.qos = kImuReader, .required = false});
+  context_.subscribe<Imu>(
+      kImu, [this](const auto& imu) { on_imu(*imu); }, {.qos = kImuReader, .required = false});
 }
 
 template <typename ImageMessage>

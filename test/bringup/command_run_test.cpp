@@ -152,6 +152,9 @@ TEST_F(CommandRun, SaysWhatARecordingHoldsNothingFor) {
   const auto result = command({"run", write("live.yaml", kLive), "--bag", bag});
   EXPECT_THAT(result.output, HasSubstr("holds nothing for input 'lidar' of sync: no /livox/lidar"));
   EXPECT_THAT(result.output, Not(HasSubstr("nothing for input 'image'")));
+  EXPECT_THAT(result.output,
+              HasSubstr("nothing came on input 'image' (topic /camera/image_raw or /front/jpeg)"))
+      << "it holds no message";
 }
 
 TEST_F(CommandRun, EndsWithTheBagThatItReplays) {

@@ -141,17 +141,17 @@ TEST_F(EndToEnd, ATopicThatTheRecordingLacksIsNamed) {
   };
   for (const Case& one : {Case{"no_lidar",
                                "/camera/image_raw/compressed, /livox/imu",
-                               "'lidar' (topic /livox/lidar ",
+                               "'lidar' (topic /livox/lidar)",
                                "[results]: 0 of 51 frames",
                                3},
                           Case{"no_image",
                                "/livox/lidar, /livox/imu",
-                               "'image' (topic /camera/image_raw or /camera/image_raw/compressed ",
+                               "'image' (topic /camera/image_raw or /camera/image_raw/compressed)",
                                "[results]: 0 of 0 frames",
                                3},
                           Case{"no_imu",
                                "/camera/image_raw/compressed, /livox/lidar",
-                               "'imu' (topic /livox/imu ",
+                               "'imu' (topic /livox/imu)",
                                "[results]: 50 of 51 frames",
                                0}}) {
     const auto result =

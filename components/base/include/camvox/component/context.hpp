@@ -187,6 +187,11 @@ class Context {
                  });
   }
 
+  /// What the port is connected to: its default topic, or the one of the config's `remap`.
+  [[nodiscard]] virtual std::string topic_of(const Port& port) const {
+    return std::string(port.default_topic);
+  }
+
   /// All topics that this process or another one publishes or reads at the moment, by name.
   [[nodiscard]] virtual std::vector<TopicDescription> topics() const { return {}; }
 

@@ -41,6 +41,10 @@ class FakeContext final : public Context, public RestartMemory {
 
   /// Gives a parameter, before the component is made.
   void set_parameter(std::string_view key, config::Value value);
+  /// What topic_of() tells of a port; its default topic unless set.
+  void set_topic_of(std::string_view port, std::string topic) {
+    remap_.insert_or_assign(std::string(port), std::move(topic));
+  }
   /// What earlier_runs() tells the component, which is made after; 0 unless set.
   void set_earlier_runs(std::uint64_t count) { earlier_runs_ = count; }
   /// Changes parameters as `camvox param set` does. Returns what is wrong; then nothing changed.
@@ -120,6 +124,7 @@ class FakeContext final : public Context, public RestartMemory {
   [[nodiscard]] Logger& log() override;
   [[nodiscard]] Diagnostics& diagnostics() override { return diagnostics_; }
   [[nodiscard]] std::int64_t now_ns() const override { return now_ns_; }
+  [[nodiscard]] std::string topic_of(const Port& port) const override;
   [[nodiscard]] std::vector<TopicDescription> topics() const override { return topics_; }
   void every(std::chrono::nanoseconds period, std::function<void()> callback) override;
   void post(std::function<void()> callback) override;
@@ -199,6 +204,7 @@ class FakeContext final : public Context, public RestartMemory {
   ChangeHandler change_handler_;
   std::unique_ptr<CapturingLogger> log_;
   Diagnostics diagnostics_;
+  std::map<std::string, std::string, std::less<>> remap_;
   std::vector<TopicDescription> topics_;
   std::map<std::string, std::shared_ptr<FakePublisher>, std::less<>> outputs_;
   std::map<std::string, std::shared_ptr<FakeSubscription>, std::less<>> inputs_;

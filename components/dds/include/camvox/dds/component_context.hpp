@@ -109,6 +109,7 @@ class ComponentContext final : public Context, public RestartMemory {
   [[nodiscard]] Logger& log() override { return *log_; }
   [[nodiscard]] Diagnostics& diagnostics() override { return diagnostics_; }
   [[nodiscard]] std::int64_t now_ns() const override;
+  [[nodiscard]] std::string topic_of(const Port& port) const override;
   [[nodiscard]] std::vector<TopicDescription> topics() const override;
   void every(std::chrono::nanoseconds period, std::function<void()> callback) override;
   void post(std::function<void()> callback) override;
@@ -148,7 +149,6 @@ class ComponentContext final : public Context, public RestartMemory {
                     ServiceHandler handler) override;
 
  private:
-  [[nodiscard]] std::string topic_of(const Port& port) const;
   [[nodiscard]] TopicSettings settings_of(const std::string& topic) const;
   void when_active(std::function<void()> action);
   void keep(const std::string& topic, Subscription subscription);
