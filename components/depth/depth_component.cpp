@@ -28,7 +28,7 @@ DepthComponent::DepthComponent(Context& context)
     : context_(context),
       config_(context.parameters<DepthComponentConfig>()),
       projector_(sensors::CameraModel(config_.camera), config_.projector),
-      extrinsics_(sensors::make_rig_calibration(config_.rig).T_camera_lidar()),
+      extrinsics_(sensors::make_rig_calibration(config_.rig)),
       accumulator_(config_.accumulate_scans, config_.rig),
       progress_(context),
       depth_images_(context.advertise<DepthImage>({"depth_image", topics::kDepthImage},

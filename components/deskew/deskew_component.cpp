@@ -35,8 +35,7 @@ DeskewComponent::DeskewComponent(Context& context)
     : context_(context),
       config_(context.parameters<DeskewComponentConfig>()),
       rig_(sensors::make_rig_calibration(config_.rig)),
-      extrinsics_(rig_.T_camera_lidar()),
-      T_camera_imu_(extrinsics_.T_camera_lidar() * rig_.T_imu_lidar.inverse()),
+      extrinsics_(rig_),
       filter_(config_.motion),
       progress_(context),
       clouds_(context.advertise<Cloud>({"cloud", topics::kCloud}, {.qos = qos::kFrames})) {
@@ -54,7 +53,6 @@ DeskewComponent::DeskewComponent(Context& context)
 
 void DeskewComponent::on_extrinsics(const Extrinsics& extrinsics) {
   if (!extrinsics_.take(extrinsics)) return;
-  T_camera_imu_ = extrinsics_.T_camera_lidar() * rig_.T_imu_lidar.inverse();
   filter_.forget_odometry();
   context_.log().info("extrinsics version {} from now on", extrinsics_.version());
 }
@@ -81,7 +79,8 @@ void DeskewComponent::on_pose(const FramePose& pose) {
     filter_.forget_velocity();
   }
   if (config_.use_imu && last_step_ && last_step_->to_ns == pose.header().stamp_ns()) {
-    const SE3 T_imu_step = T_camera_imu_.inverse() * last_step_->T_from_to * T_camera_imu_;
+    const SE3 T_camera_imu = extrinsics_.T_camera_imu();
+    const SE3 T_imu_step = T_camera_imu.inverse() * last_step_->T_from_to * T_camera_imu;
     filter_.add_odometry({last_step_->from_ns, last_step_->to_ns, T_imu_step});
   }
   process_waiting();

@@ -33,8 +33,7 @@ TrackingComponent::TrackingComponent(Context& context)
     : context_(context),
       config_(context.parameters<TrackingComponentConfig>()),
       rig_(sensors::make_rig_calibration(config_.rig)),
-      extrinsics_(rig_.T_camera_lidar()),
-      R_camera_imu_((rig_.T_imu_lidar * rig_.T_lidar_camera).inverse().rotation()),
+      extrinsics_(rig_),
       builder_(config_.frame, config_.camera),
       tracker_(tracker_config(config_), builder_.tracking_camera(), rig_.T_body_camera),
       queue_(config_.use_imu, config_.lockstep),
@@ -83,8 +82,6 @@ TrackingComponent::TrackingComponent(Context& context)
 
 void TrackingComponent::on_extrinsics(const msg::Extrinsics& extrinsics) {
   if (!extrinsics_.take(extrinsics)) return;
-  // The IMU moves with the lidar.
-  R_camera_imu_ = extrinsics_.T_camera_lidar().rotation() * rig_.T_imu_lidar.rotation().inverse();
   context_.log().info("extrinsics version {} from now on", extrinsics_.version());
 }
 
@@ -125,7 +122,8 @@ void TrackingComponent::on_answer(const Answer& answer) {
 }
 
 void TrackingComponent::remember_rotation(const msg::Cloud& cloud) {
-  const auto R_previous_camera = camera_rotation(cloud.rotation_imu(), R_camera_imu_);
+  const auto R_previous_camera =
+      camera_rotation(cloud.rotation_imu(), extrinsics_.T_camera_imu().rotation());
   if (R_previous_camera) rotations_.add(cloud.header().frame_id(), *R_previous_camera);
 }
 

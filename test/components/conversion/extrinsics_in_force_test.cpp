@@ -2,12 +2,15 @@
 
 #include <gtest/gtest.h>
 
+#include <numbers>
+
 #include "camvox/conversion/pose.hpp"
 
 namespace camvox::conversion {
 namespace {
 
 using geometry::SE3;
+using geometry::SO3;
 
 class ExtrinsicsInForceTest : public ::testing::Test {
  protected:
@@ -21,7 +24,14 @@ class ExtrinsicsInForceTest : public ::testing::Test {
   }
   [[nodiscard]] double x_m() const { return in_force_.T_camera_lidar().translation().x(); }
 
-  ExtrinsicsInForce in_force_{SE3({}, {7.0, 0.0, 0.0})};
+  static sensors::RigCalibration rig() {
+    sensors::RigCalibration rig;
+    rig.T_lidar_camera = SE3({}, {-7.0, 0.0, 0.0});
+    rig.T_imu_lidar = SE3(SO3::exp({0.0, 0.0, 0.5 * std::numbers::pi}), {0.0, 2.0, 0.0});
+    return rig;
+  }
+
+  ExtrinsicsInForce in_force_{rig()};
 };
 
 TEST_F(ExtrinsicsInForceTest, TheRigFilesUntilACalibrationPasses) {
@@ -32,6 +42,19 @@ TEST_F(ExtrinsicsInForceTest, TheRigFilesUntilACalibrationPasses) {
   EXPECT_TRUE(take(1, 100, 1.0));
   EXPECT_EQ(x_m(), 1.0);
   EXPECT_EQ(in_force_.version(), 1U);
+}
+
+/// The lidar is 2 m along the IMU's y, which is the lidar's x and the camera's: these two are
+/// parallel, and see the IMU 2 m behind the lidar.
+TEST_F(ExtrinsicsInForceTest, TheImuMovesWithTheLidar) {
+  const Eigen::Vector3d x_imu(1.0, 0.0, 0.0);
+  for (const double lidar_m : {7.0, 1.0}) {
+    const SE3 T_camera_imu = in_force_.T_camera_imu();
+    EXPECT_LT((T_camera_imu.translation() - Eigen::Vector3d(lidar_m - 2.0, 0.0, 0.0)).norm(),
+              1e-12);
+    EXPECT_LT((T_camera_imu.rotation() * x_imu - Eigen::Vector3d(0.0, -1.0, 0.0)).norm(), 1e-12);
+    (void)take(1, 100, 1.0);
+  }
 }
 
 TEST_F(ExtrinsicsInForceTest, WhatIsRepeatedOrOlderIsNothingNew) {

@@ -60,7 +60,6 @@ class DeskewComponent final : public Component {
   DeskewComponentConfig config_;
   sensors::RigCalibration rig_;
   conversion::ExtrinsicsInForce extrinsics_;
-  geometry::SE3 T_camera_imu_;
   lidar::InertialMotionFilter filter_;
   conversion::OdometrySteps steps_;
   std::optional<conversion::CameraStep> last_step_;

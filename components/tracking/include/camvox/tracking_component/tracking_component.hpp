@@ -91,7 +91,6 @@ class TrackingComponent final : public Component {
   TrackingComponentConfig config_;
   sensors::RigCalibration rig_;
   conversion::ExtrinsicsInForce extrinsics_;
-  geometry::SO3 R_camera_imu_;
   tracking::FrameBuilder builder_;
   tracking::Tracker tracker_;
   tracking::HealthMonitor health_;
