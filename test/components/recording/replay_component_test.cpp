@@ -142,19 +142,31 @@ INSTANTIATE_TEST_SUITE_P(Clocks,
                          ReplayWithAnOffset,
                          ::testing::Values(-30'000'000, 0, 500'000'000));
 
-/// Images in lockstep, one at a time, of which sync alone reports the first.
-class ReplayThatIsHeld : public ::testing::Test {
+/// Two images in lockstep, which sync and tracking report.
+class ReplayOfTwoFrames : public ::testing::Test {
  protected:
-  void SetUp() override {
+  void start() {
     recording::write_bag(folder_.file("bag"), {{"/image", 0.0, 0}, {"/image", 0.1, 2}});
     fake_.set_parameter("bag", folder_.file("bag"));
     fake_.set_parameter("lockstep", true);
     fake_.set_parameter("lockstep_topic", std::string("/image"));
     fake_.set_parameter("lockstep_components", std::vector<std::string>{"sync", "tracking"});
-    fake_.set_parameter("frames_in_flight", std::int64_t{1});
     fake_.set_parameter("exit_at_end", true);
     replay_.emplace(fake_);
     replay_->start();
+  }
+
+  const TemporaryFolder folder_;
+  FakeContext fake_;
+  std::optional<ReplayComponent> replay_;
+};
+
+/// One at a time, and sync alone reports the first.
+class ReplayThatIsHeld : public ReplayOfTwoFrames {
+ protected:
+  void SetUp() override {
+    fake_.set_parameter("frames_in_flight", std::int64_t{1});
+    start();
     ASSERT_TRUE(sent(fake_, "1"));
     send_progress(fake_, "sync", kStart_ns, 1);
   }
@@ -169,10 +181,6 @@ class ReplayThatIsHeld : public ::testing::Test {
       status.values().back().value(state);
     });
   }
-
-  const TemporaryFolder folder_;
-  FakeContext fake_;
-  std::optional<ReplayComponent> replay_;
 };
 
 TEST_F(ReplayThatIsHeld, GivesUpWhenNothingMovesAndNamesWhoIsMissing) {
@@ -255,28 +263,17 @@ TEST(ReplayComponent, DoesNotAskForTheExitWhileAComponentHasWork) {
   EXPECT_TRUE(fake.exit_requested());
 }
 
-/// Two frames in lockstep, which sync and tracking report.
-class ReplayToTheEnd : public ::testing::Test {
+/// Both are sent.
+class ReplayToTheEnd : public ReplayOfTwoFrames {
  protected:
   void SetUp() override {
-    recording::write_bag(folder_.file("bag"), {{"/image", 0.0, 0}, {"/image", 0.1, 2}});
-    fake_.set_parameter("bag", folder_.file("bag"));
-    fake_.set_parameter("lockstep", true);
-    fake_.set_parameter("lockstep_topic", std::string("/image"));
-    fake_.set_parameter("lockstep_components", std::vector<std::string>{"sync", "tracking"});
-    fake_.set_parameter("exit_at_end", true);
     fake_.set_parameter("settle_s", 0.2);
-    replay_.emplace(fake_);
-    replay_->start();
+    start();
     ASSERT_TRUE(run_until(fake_, [&] { return logged(fake_, "2 messages sent"); }));
   }
   void report(std::string_view component, std::uint64_t frame_id) {
     send_progress(fake_, component, kStart_ns + static_cast<std::int64_t>(frame_id), frame_id);
   }
-
-  const TemporaryFolder folder_;
-  FakeContext fake_;
-  std::optional<ReplayComponent> replay_;
 };
 
 /// A busy machine may take longer for the last frame than any time that one would wait.
