@@ -211,6 +211,22 @@ def repeat(arguments, folder):
     return 1 if differ else 0
 
 
+def carry_out(parser, domain, work):
+    """Calls `work` with the arguments and a folder, which stays only with --keep; the exit code."""
+    parser.add_argument("--domain", type=int, default=domain, help="ROS_DOMAIN_ID of the runs")
+    parser.add_argument("--keep", type=pathlib.Path, help="folder for what the runs leave")
+    arguments = parser.parse_args()
+    folder = arguments.keep or pathlib.Path(tempfile.mkdtemp(prefix="camvox_experiments_"))
+    try:
+        return work(arguments, folder.absolute()) or 0
+    except Failed as failure:
+        print(failure, file=sys.stderr)
+        return 1
+    finally:
+        if not arguments.keep:
+            shutil.rmtree(folder, ignore_errors=True)
+
+
 def main():
     commands = {"close-depth": (close_depth, ["demo"]), "accuracy": (accuracy, list(PRESETS[:6])),
                 "timing": (timing, ["demo"]), "yardstick": (yardstick, ["loop_400m"]),
@@ -223,20 +239,13 @@ def main():
     parser.add_argument("--runs", type=int, default=10, help="of repeat")
     parser.add_argument("--images", default="synthetic 1520x568",
                         help="of yardstick: a line of bench_extraction")
-    parser.add_argument("--domain", type=int, default=96, help="ROS_DOMAIN_ID of the runs")
-    parser.add_argument("--keep", type=pathlib.Path, help="folder for what the runs leave")
-    arguments = parser.parse_args()
-    experiment, default = commands[arguments.experiment]
-    arguments.recordings = arguments.recordings or default
-    folder = arguments.keep or pathlib.Path(tempfile.mkdtemp(prefix="camvox_experiments_"))
-    try:
-        return experiment(arguments, folder.absolute()) or 0
-    except Failed as failure:
-        print(failure, file=sys.stderr)
-        return 1
-    finally:
-        if not arguments.keep:
-            shutil.rmtree(folder, ignore_errors=True)
+
+    def work(arguments, folder):
+        experiment, default = commands[arguments.experiment]
+        arguments.recordings = arguments.recordings or default
+        return experiment(arguments, folder)
+
+    return carry_out(parser, 96, work)
 
 
 if __name__ == "__main__":

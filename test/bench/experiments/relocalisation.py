@@ -19,9 +19,8 @@ import pathlib
 import random
 import shutil
 import sys
-import tempfile
 
-from experiments import ROOT, TRACKED, Failed, camvox, rows_of, table
+from experiments import ROOT, TRACKED, camvox, carry_out, rows_of, table
 
 RATE_HZ = 30
 GAP = 100         # frames
@@ -185,28 +184,20 @@ def show(title, answers):
     print(flush=True)
 
 
+def relocalise(arguments, folder):
+    runs = Runs(arguments, folder)
+    if arguments.only != "starts":
+        show("After a gap of 100 frames, by the frame that it starts with", runs.gaps())
+    if arguments.only != "gaps":
+        show("Fresh starts in a saved map, by their first frame", runs.starts())
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("redkitchen", type=pathlib.Path)
     parser.add_argument("--only", choices=("gaps", "starts"))
-    parser.add_argument("--domain", type=int, default=97, help="ROS_DOMAIN_ID of the runs")
-    parser.add_argument("--keep", type=pathlib.Path, help="folder for what the runs leave")
-    arguments = parser.parse_args()
-    folder = arguments.keep or pathlib.Path(tempfile.mkdtemp(prefix="camvox_relocalisation_"))
-    try:
-        runs = Runs(arguments, folder.absolute())
-        if arguments.only != "starts":
-            show("After a gap of 100 frames, by the frame that it starts with", runs.gaps())
-        if arguments.only != "gaps":
-            show("Fresh starts in a saved map, by their first frame", runs.starts())
-    except Failed as failure:
-        print(failure, file=sys.stderr)
-        return 1
-    finally:
-        if not arguments.keep:
-            shutil.rmtree(folder, ignore_errors=True)
-    return 0
+    return carry_out(parser, 97, relocalise)
 
 
 if __name__ == "__main__":
