@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "camvox/calibration_component/rig_file.hpp"
-#include "camvox/component/restart_memory.hpp"
 #include "camvox/conversion/pose.hpp"
 
 namespace camvox {
@@ -28,8 +27,8 @@ CalibrationComponent::CalibrationComponent(Context& context)
   if (auto problems = sensors::check(config_.camera); !problems.empty()) {
     throw config::ConfigError(std::move(problems));
   }
-  const auto* memory = restart_memory(context);
-  if (const auto* extrinsics = std::any_cast<Extrinsics>(memory)) put_in_force(*extrinsics);
+  if (const auto* extrinsics = std::any_cast<Extrinsics>(context.restart_memory()))
+    put_in_force(*extrinsics);
   const SubscribeOptions frames{.qos = qos::kFrames, .max_held = kFramesKept};
   context.subscribe<FrameImage>(
       {"frame_image", topics::kFrameImage},
@@ -69,7 +68,7 @@ void CalibrationComponent::put_in_force(const Extrinsics& extrinsics) {
   in_force_ = extrinsics;
   T_camera_lidar_ = conversion::to_se3(extrinsics.T_camera_lidar());
   rig_.T_lidar_camera = T_camera_lidar_.inverse();
-  if (auto* memory = restart_memory(context_)) *memory = extrinsics;
+  if (auto* memory = context_.restart_memory()) *memory = extrinsics;
 }
 
 template <typename Message>

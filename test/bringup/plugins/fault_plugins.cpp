@@ -7,7 +7,6 @@
 #include <thread>
 
 #include "camvox/component/component.hpp"
-#include "camvox/component/restart_memory.hpp"
 #include "camvox/interfaces/std_msgs.hpp"
 
 namespace test {
@@ -39,7 +38,7 @@ class Ticker : public camvox::Component {
       : context_(context),
         config_(context.parameters<FaultConfig>()),
         publisher_(context.advertise<Header>({"ticks", "/test/ticks"})) {
-    if (const auto* earlier = std::any_cast<std::uint64_t>(camvox::restart_memory(context)))
+    if (const auto* earlier = std::any_cast<std::uint64_t>(context.restart_memory()))
       context.log().info("{} ticks before the error", *earlier);
     context.on_parameter_change<FaultConfig>(config_,
                                              [this](const FaultConfig& next) { config_ = next; });
@@ -54,7 +53,7 @@ class Ticker : public camvox::Component {
   void tick() {
     ++ticks_;
     context_.diagnostics().set("ticks", ticks_);
-    if (auto* memory = camvox::restart_memory(context_)) *memory = ticks_;
+    if (auto* memory = context_.restart_memory()) *memory = ticks_;
     auto header = publisher_.loan();
     header->frame_id(context_.name());
     publisher_.publish(std::move(header));

@@ -125,7 +125,7 @@ TEST_F(CalibrationComponentTest, AppliesABetterResultAtStandstill) {
   EXPECT_THAT(text, HasSubstr("rig:\n"));
   EXPECT_THAT(text, HasSubstr("  T_lidar_camera:\n    rotation_xyzw: ["));
   const auto results = folder_ / "results";
-  const auto* remembered = std::any_cast<Extrinsics>(&fake_.restart_memory());
+  const auto* remembered = std::any_cast<Extrinsics>(fake_.restart_memory());
   ASSERT_NE(remembered, nullptr);
   EXPECT_EQ(*remembered, *published[0]);
   EXPECT_TRUE(fs::exists(results / "calibration_before.png"));
@@ -145,7 +145,7 @@ TEST_F(CalibrationComponentTest, WhatIsInForceStaysSoWhenItIsMadeAnew) {
   in_force.version(3);
   in_force.applied(1);
   in_force.T_camera_lidar(conversion::to_array(T_camera_lidar));
-  fake_.restart_memory() = in_force;
+  *fake_.restart_memory() = in_force;
   CalibrationComponent component(fake_);
   EXPECT_TRUE(fake_.published<Extrinsics>("extrinsics").empty());
   component.start();
@@ -169,7 +169,7 @@ TEST_F(CalibrationComponentTest, InLockstepItComputesAtOnceAndOnlyProposes) {
   ASSERT_EQ(published.size(), 1U);  // without waiting for a thread
   EXPECT_EQ(fake_.run_posted(), 0U);
   EXPECT_EQ(published[0]->applied(), 0);
-  EXPECT_FALSE(fake_.restart_memory().has_value());
+  EXPECT_FALSE(fake_.restart_memory()->has_value());
   EXPECT_THAT(fake_.diagnostics().status().message, HasSubstr("proposed"));
   EXPECT_THAT(text_of(folder_ / "results" / "calibration.yaml"), HasSubstr("# accepted\n"));
   // One for each frame, so that a replay can wait.

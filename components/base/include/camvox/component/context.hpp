@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <any>
 #include <chrono>
 #include <cstdint>
 #include <functional>
@@ -98,6 +99,10 @@ class Context {
   /// How many components of this name the container has had before: 0 at first, then one more with
   /// each restart or load. For numbers that others compare and that must therefore not begin anew.
   [[nodiscard]] virtual std::uint64_t earlier_runs() const { return 0; }
+  /// What a component leaves to the one that takes its place after an error (on_error: restart);
+  /// empty at first. For what was found while running and no config knows. Of the component's
+  /// thread; null where nobody keeps it.
+  [[nodiscard]] virtual std::any* restart_memory() { return nullptr; }
   [[nodiscard]] virtual Logger& log() = 0;
   [[nodiscard]] virtual Diagnostics& diagnostics() = 0;
   /// Wall clock, or the time of /clock when `use_sim_time` is set; ns since the epoch.

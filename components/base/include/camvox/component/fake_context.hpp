@@ -8,7 +8,6 @@
 #include <type_traits>
 
 #include "camvox/component/context.hpp"
-#include "camvox/component/restart_memory.hpp"
 
 namespace camvox {
 
@@ -29,7 +28,7 @@ class FakeSubscription;
 /// component that keeps more than `max_held` samples gets no more, as in the container. The rows of
 /// a new message's lists hold junk, as those of a reused loan do. Mistakes in the test itself (an
 /// unknown port, another type) throw std::logic_error. The context must outlive the component.
-class FakeContext final : public Context, public RestartMemory {
+class FakeContext final : public Context {
  public:
   struct LogEntry {
     LogLevel level = LogLevel::kInfo;
@@ -131,7 +130,7 @@ class FakeContext final : public Context, public RestartMemory {
   void request_exit() override { exit_requested_ = true; }
   [[nodiscard]] bool exit_requested() const { return exit_requested_; }
   /// A restart is another component on another context that was given this.
-  [[nodiscard]] std::any& restart_memory() override { return restart_memory_; }
+  [[nodiscard]] std::any* restart_memory() override { return &restart_memory_; }
   [[nodiscard]] bool all_idle() const override { return all_idle_; }
   /// What all_idle() tells; true unless set.
   void set_all_idle(bool idle) { all_idle_ = idle; }

@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "camvox/component/context.hpp"
-#include "camvox/component/restart_memory.hpp"
 #include "camvox/dds/executor.hpp"
 #include "camvox/dds/participant.hpp"
 #include "camvox/dds/service.hpp"
@@ -45,7 +44,7 @@ struct ComponentSettings {
   config::ParameterMap parameters;
   std::map<std::string, std::string, std::less<>> remap;  ///< Port name -> topic name.
   std::uint64_t earlier_runs = 0;                         ///< See Context.
-  /// See camvox::restart_memory.
+  /// See Context.
   std::shared_ptr<std::any> restart_memory = std::make_shared<std::any>();
 };
 
@@ -77,7 +76,7 @@ struct UnsentCount {
 
 /// Context over Fast DDS. Endpoints are made while the component is constructed, but nothing is
 /// delivered before `activate`.
-class ComponentContext final : public Context, public RestartMemory {
+class ComponentContext final : public Context {
  public:
   /// `on_error` gets each exception that leaves a callback, on the executor's thread.
   ComponentContext(ComponentSettings settings,
@@ -105,7 +104,7 @@ class ComponentContext final : public Context, public RestartMemory {
 
   [[nodiscard]] const std::string& name() const override { return settings_.name; }
   [[nodiscard]] std::uint64_t earlier_runs() const override { return settings_.earlier_runs; }
-  [[nodiscard]] std::any& restart_memory() override { return *settings_.restart_memory; }
+  [[nodiscard]] std::any* restart_memory() override { return settings_.restart_memory.get(); }
   [[nodiscard]] Logger& log() override { return *log_; }
   [[nodiscard]] Diagnostics& diagnostics() override { return diagnostics_; }
   [[nodiscard]] std::int64_t now_ns() const override;
