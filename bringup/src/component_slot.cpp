@@ -131,9 +131,10 @@ void ComponentSlot::Failures::add(const std::exception_ptr& error) {
     log->warn("error ignored: {}", text);
     return;
   }
-  log->error("{} after an error: {}", policy == "stop" ? "stops" : "restarts", text);
   if (const auto failed = tenant.lock()) failed->close();
   pending = true;  // the rest is done in tick(), on another thread
+  // Last: who reads it and ends the container at once must get the exit code that it made.
+  log->error("{} after an error: {}", policy == "stop" ? "stops" : "restarts", text);
 }
 
 void ComponentSlot::Failures::fail(const std::exception_ptr& error) {
