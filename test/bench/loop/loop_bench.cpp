@@ -252,35 +252,37 @@ struct Circuit {
 
 /// A correction as LoopCloser makes it, from the graph of the map. With a wrong loop it is solved
 /// from two starts and again without that loop.
+void measure_correction(std::size_t nodes, std::size_t wrong_loops) {
+  std::vector<double> wall_ms, cpu_ms;
+  std::size_t edges = 0;
+  for (unsigned seed = 1; seed <= 9; ++seed) {
+    Circuit circuit(nodes, seed);
+    circuit.loops.resize(3);
+    circuit.add_wrong_loops(wrong_loops);
+    const auto task = circuit.correction_task(circuit.loops.size());
+    edges = task.graph.edges.size();
+    const auto wall = std::chrono::steady_clock::now();
+    const double cpu_s = thread_processor_time_s();
+    (void)loop::correct(task);
+    cpu_ms.push_back(1e3 * (thread_processor_time_s() - cpu_s));
+    wall_ms.push_back(
+        1e3 * std::chrono::duration<double>(std::chrono::steady_clock::now() - wall).count());
+  }
+  std::printf("| %zu | %zu | %zu | %.0f / %.0f | %.0f |\n",
+              nodes,
+              edges,
+              wrong_loops,
+              quantile(wall_ms, 0.5),
+              quantile(wall_ms, 1.0),
+              quantile(cpu_ms, 0.5));
+}
+
 void measure_pose_graph() {
   std::puts(
       "\n| poses | edges | wrong loops | wall ms, median / max of 9 | CPU ms, median |\n"
       "| --- | --- | --- | --- | --- |");
   for (const std::size_t nodes : {200U, 1000U, 2000U}) {
-    for (const std::size_t wrong : {0U, 1U}) {
-      std::vector<double> wall_ms, cpu_ms;
-      std::size_t edges = 0;
-      for (unsigned seed = 1; seed <= 9; ++seed) {
-        Circuit circuit(nodes, seed);
-        circuit.loops.resize(3);
-        circuit.add_wrong_loops(wrong);
-        const auto task = circuit.correction_task(circuit.loops.size());
-        edges = task.graph.edges.size();
-        const auto wall = std::chrono::steady_clock::now();
-        const double cpu_s = thread_processor_time_s();
-        (void)loop::correct(task);
-        cpu_ms.push_back(1e3 * (thread_processor_time_s() - cpu_s));
-        wall_ms.push_back(
-            1e3 * std::chrono::duration<double>(std::chrono::steady_clock::now() - wall).count());
-      }
-      std::printf("| %zu | %zu | %zu | %.0f / %.0f | %.0f |\n",
-                  nodes,
-                  edges,
-                  wrong,
-                  quantile(wall_ms, 0.5),
-                  quantile(wall_ms, 1.0),
-                  quantile(cpu_ms, 0.5));
-    }
+    for (const std::size_t wrong_loops : {0U, 1U}) measure_correction(nodes, wrong_loops);
   }
 }
 
